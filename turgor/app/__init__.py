@@ -1,0 +1,1 @@
+"""The web viewer, which reads stored results."""

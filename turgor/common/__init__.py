@@ -1,0 +1,1 @@
+"""Units, errors, log and optional packages: what every other room may use."""

@@ -1,0 +1,14 @@
+"""The package's logger; a command attaches handlers, a library user decides for himself."""
+
+from __future__ import annotations
+
+import logging
+
+LOGGER_NAME = "turgor"
+
+
+def logger(room: str) -> logging.Logger:
+    """Return the logger of one room (``logger("solver")``); silent unless somebody listens."""
+    log = logging.getLogger(f"{LOGGER_NAME}.{room}")
+    logging.getLogger(LOGGER_NAME).addHandler(logging.NullHandler())
+    return log

@@ -1,0 +1,180 @@
+"""Quantities with units at the border, plain floats inside.
+
+Inside Turgor every number is in millimetre, newton, megapascal, tonne, second and radian. At a border
+(case files, the command line, CSV headers, constructors) a quantity is text such as ``"12 psi"`` or a
+pint quantity; a bare number where a unit is needed is an error.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from turgor.common.errors import InputError
+
+if TYPE_CHECKING:
+    import pint
+
+INTERNAL_UNITS: dict[str, str] = {
+    "length": "mm",
+    "area": "mm^2",
+    "volume": "mm^3",
+    "pressure": "MPa",
+    "compliance": "1/MPa",
+    "force": "N",
+    "foundation": "N/mm^3",
+    "density": "t/mm^3",
+    "acceleration": "mm/s^2",
+    "time": "s",
+    "angle": "rad",
+}
+"""The unit in which each dimension is kept inside."""
+
+EXAMPLES: dict[str, str] = {
+    "length": "3 mm",
+    "area": "18 mm^2",
+    "volume": "5 ml",
+    "pressure": "12 psi",
+    "compliance": "30 1/MPa",
+    "force": "1.5 N",
+    "foundation": "0.01 N/mm^3",
+    "density": "1070 kg/m^3",
+    "acceleration": "9.81 m/s^2",
+    "time": "2 s",
+    "angle": "51 deg",
+}
+"""A well-formed value of each dimension, quoted in messages and in the JSON Schema."""
+
+
+@functools.cache
+def registry() -> pint.UnitRegistry[Any]:
+    """Return the one unit registry (built when first used: pint takes a while to load)."""
+    import pint
+
+    units: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=None)
+    return units
+
+
+def to_internal(value: object, dimension: str, *, key: str | None = None) -> float:
+    """Convert a quantity to the internal unit of its `dimension`.
+
+    Parameters
+    ----------
+    value
+        Text with a unit (``"12 psi"``) or a pint quantity.
+    dimension
+        A key of :data:`INTERNAL_UNITS`.
+    key
+        Name of the value, for the message.
+
+    Raises
+    ------
+    InputError
+        If the unit is missing, unknown or of another dimension, or the number is not finite.
+    """
+    expected = f"a {dimension} with its unit, such as '{EXAMPLES[dimension]}'"
+    units = registry()
+    if isinstance(value, units.Quantity):
+        quantity = value
+    elif isinstance(value, str):
+        quantity = _parse(value, expected, key)
+    else:
+        problem = "a unit is missing" if isinstance(value, (int, float)) else "this is not a quantity"
+        raise InputError(problem, key=key, value=value, expected=expected)
+    target = INTERNAL_UNITS[dimension]
+    if quantity.dimensionless and dimension != "angle":
+        raise InputError("a unit is missing", key=key, value=value, expected=expected)
+    if dimension == "angle" and quantity.unitless:
+        raise InputError("a unit is missing", key=key, value=value, expected=expected)
+    if not quantity.check(units.parse_units(target).dimensionality):
+        raise InputError(f"'{quantity.units:~}' is not a unit of {dimension}", key=key, value=value, expected=expected)
+    number = float(quantity.to(target).magnitude)
+    if not math.isfinite(number):
+        raise InputError("the number is not finite", key=key, value=value, expected=expected)
+    return number
+
+
+def from_internal(number: float, dimension: str, unit: str | None = None) -> float:
+    """Convert `number` from the internal unit of its `dimension` to `unit`."""
+    if unit is None:
+        return number
+    return float(registry().Quantity(number, INTERNAL_UNITS[dimension]).to(unit).magnitude)
+
+
+def to_text(number: float, dimension: str, unit: str | None = None) -> str:
+    """Write an internal `number` as text with its unit; reading it back returns the same number."""
+    chosen = unit or INTERNAL_UNITS[dimension]
+    return f"{from_internal(number, dimension, unit):.17g} {chosen}" if unit else f"{number!r} {chosen}"
+
+
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf))\s*(?P<unit>[^\d\s+-].{0,40})?\s*"
+)
+
+
+def _parse(text: str, expected: str, key: str | None) -> pint.Quantity[Any]:
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise InputError("this is not a quantity", key=key, value=text, expected=expected)
+    if match["unit"] is None:
+        raise InputError("a unit is missing", key=key, value=text, expected=expected)
+    try:
+        unit = registry().parse_units(match["unit"].strip())
+    except Exception as error:  # pint's parser lets several kinds of exception through
+        raise InputError("this is not a quantity with a known unit", key=key, value=text, expected=expected) from error
+    return registry().Quantity(float(match["number"]), unit)
+
+
+def quantity_type(dimension: str, minimum: float | None = None, exclusive: bool = False) -> Any:
+    """Make a pydantic field type that reads text with a unit and holds an internal float.
+
+    With `minimum`, smaller values are refused (`exclusive`: equal ones too). The field is written back as
+    text with its internal unit, and its JSON Schema is a string.
+    """
+
+    def read(value: object) -> float:
+        number = to_internal(value, dimension)
+        if minimum is not None and (number < minimum or (exclusive and number == minimum)):
+            bound = "greater than" if exclusive else "at least"
+            raise InputError(
+                f"the {dimension} must be {bound} {minimum:g} {INTERNAL_UNITS[dimension]}",
+                value=value,
+            )
+        return number
+
+    return Annotated[
+        float,
+        BeforeValidator(_as_value_error(read)),
+        PlainSerializer(functools.partial(to_text, dimension=dimension), return_type=str),
+        WithJsonSchema({"type": "string", "description": f"{dimension} with unit", "examples": [EXAMPLES[dimension]]}),
+    ]
+
+
+def _as_value_error(read: Callable[[object], float]) -> Callable[[object], float]:
+    # pydantic collects ValueErrors with the place where each occurred, which is what the message needs.
+    @functools.wraps(read)
+    def wrapped(value: object) -> float:
+        try:
+            return read(value)
+        except InputError as error:
+            raise ValueError(str(error)) from error
+
+    return wrapped
+
+
+Length = quantity_type("length")
+PositiveLength = quantity_type("length", 0.0, exclusive=True)
+NonNegativeLength = quantity_type("length", 0.0)
+Pressure = quantity_type("pressure")
+PositivePressure = quantity_type("pressure", 0.0, exclusive=True)
+Force = quantity_type("force")
+Foundation = quantity_type("foundation", 0.0, exclusive=True)
+Density = quantity_type("density", 0.0, exclusive=True)
+Acceleration = quantity_type("acceleration")
+Compliance = quantity_type("compliance", 0.0, exclusive=True)
+Angle = quantity_type("angle")

@@ -1,0 +1,1 @@
+"""Discrete mechanics of one state: elements, kernels, assembly, degrees of freedom, constraints, terms."""

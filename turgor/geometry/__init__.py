@@ -1,0 +1,1 @@
+"""Parametric actuators with named parts, cavities, mounts and markers."""

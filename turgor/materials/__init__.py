@@ -1,0 +1,1 @@
+"""Strain-energy models, test data, fits and the library of published coefficients."""

@@ -1,0 +1,1 @@
+"""One strain-energy model per file; a file put here is found by itself."""

@@ -1,0 +1,1 @@
+"""Meshes: generation by gmsh, named regions and surfaces, quality."""

@@ -1,0 +1,1 @@
+"""The store of a run, measures, plots and the report."""

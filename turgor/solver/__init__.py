@@ -1,0 +1,1 @@
+"""Newton's method, load stepping, linear solvers and hooks."""

@@ -1,0 +1,1 @@
+"""Case files and the studies made of them."""
