@@ -1,0 +1,212 @@
+"""The mesh: second-order tetrahedra with named regions, surfaces, markers and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from turgor.common.errors import InputError
+from turgor.mesh.faces import host_cells, rim_edges
+from turgor.mesh.tet10 import (
+    QUADRATURE_POINTS,
+    FloatArray,
+    IntArray,
+    cell_volumes,
+    face_areas,
+    face_fluxes,
+    jacobian_determinants,
+)
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A solid cut into curved ten-node tetrahedra, in mm; it does not change after construction.
+
+    Parameters
+    ----------
+    points
+        Shape ``(n, 3)``, float64.
+    cells
+        Shape ``(m, 10)``, int32: node indices in VTK order (corners, then the middles of 01 12 02 03 13 23).
+    regions
+        Name → cell indices. Every cell is in exactly one region; left out, all cells are in ``body``.
+    surfaces
+        Name → ``(k, 6)`` node indices of six-node triangles (corners, then the middles of 01 12 20), each the face of
+        a cell and oriented outward from it, so that on a cavity the normal points into the air.
+    markers
+        Name → node indices: a point, or points in order along a line.
+    curves
+        Name → ``(j, 3)`` points of a polyline that runs through the cells without belonging to them.
+
+    Raises
+    ------
+    InputError
+        If a shape, an index, an orientation or a Jacobian is wrong.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    regions: Mapping[str, IntArray] = field(default_factory=dict)
+    surfaces: Mapping[str, IntArray] = field(default_factory=dict)
+    markers: Mapping[str, IntArray] = field(default_factory=dict)
+    curves: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._set("points", _frozen(self.points, np.float64, (None, 3), "points"))
+        self._set("cells", _frozen(self.cells, np.int32, (None, 10), "cells"))
+        regions = self.regions or {"body": np.arange(len(self.cells), dtype=np.int32)}
+        self._set("regions", _frozen_map(regions, np.int32, (None,), "regions"))
+        self._set("surfaces", _frozen_map(self.surfaces, np.int32, (None, 6), "surfaces"))
+        self._set("markers", _frozen_map(self.markers, np.int32, (None,), "markers"))
+        self._set("curves", _frozen_map(self.curves, np.float64, (None, 3), "curves"))
+        self._check_points_and_cells()
+        self._check_regions()
+        for name, nodes in self.markers.items():
+            _check_indices(nodes, self.n_points, f"markers.{name}", "nodes")
+        for name, triangles in self.surfaces.items():
+            self._check_surface(name, triangles)
+
+    @property
+    def n_points(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of tetrahedra."""
+        return len(self.cells)
+
+    def region(self, name: str) -> IntArray:
+        """Return the cell indices of a region; raise InputError if there is none of that name."""
+        return _named(self.regions, name, "region")
+
+    def surface(self, name: str) -> IntArray:
+        """Return the ``(k, 6)`` triangles of a surface; raise InputError if there is none of that name."""
+        return _named(self.surfaces, name, "surface")
+
+    def marker(self, name: str) -> IntArray:
+        """Return the node indices of a marker; raise InputError if there is none of that name."""
+        return _named(self.markers, name, "marker")
+
+    def curve(self, name: str) -> FloatArray:
+        """Return the ``(j, 3)`` points of a curve; raise InputError if there is none of that name."""
+        return _named(self.curves, name, "curve")
+
+    def surface_nodes(self, name: str) -> IntArray:
+        """Return the nodes of a surface, each once, in ascending order; raise InputError for an unknown name."""
+        return np.unique(self.surface(name))
+
+    def surface_hosts(self, name: str) -> IntArray:
+        """Return the cell that each triangle of a surface is a face of, shape ``(k,)``."""
+        return host_cells(self.cells, self.surface(name))
+
+    def surface_area(self, name: str) -> float:
+        """Return the area of a surface in mm²; raise InputError for an unknown name."""
+        return float(face_areas(self.points[self.surface(name)]).sum())
+
+    def volume(self, region: str | None = None) -> float:
+        """Return the volume in mm³ of one region, or of the whole mesh (exact for the curved elements)."""
+        cells = self.cells if region is None else self.cells[self.region(region)]
+        return float(cell_volumes(self.points[cells]).sum())
+
+    def enclosed_volume(self, surface: str) -> float:
+        """Return the volume in mm³ of the air that a surface encloses, ``−⅓ ∫ x·n dA`` over its curved triangles.
+
+        The normal n points out of the solid, so a cavity's volume is positive. The surface must be closed, or closed by
+        the coordinate planes through the origin (a half, a quarter or an octant model), on which x·n vanishes.
+
+        Raises
+        ------
+        InputError
+            For an unknown name, or a surface with a rim outside these planes: it encloses no volume.
+        """
+        triangles = self.surface(surface)
+        rim = self.points[rim_edges(triangles)]
+        reach = np.abs(self.points).max()
+        if not (np.abs(rim) <= 1e-9 * reach).all(axis=1).any(axis=1).all():
+            raise InputError(
+                "the surface is open and encloses no volume",
+                key=surface,
+                expected="a closed surface, or one whose rim lies in coordinate planes through the origin",
+            )
+        flux, _ = face_fluxes(self.points[triangles])
+        return -float(flux.sum()) / 3.0
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_points_and_cells(self) -> None:
+        if not np.isfinite(self.points).all():
+            node = int(np.argmin(np.isfinite(self.points).all(axis=1)))
+            raise InputError("a node has a coordinate that is not finite", key="points", value=node)
+        if self.n_cells == 0:
+            raise InputError("the mesh has no cells", key="cells")
+        _check_indices(self.cells, self.n_points, "cells", "nodes")
+        used = np.bincount(self.cells.ravel(), minlength=self.n_points)
+        if (used == 0).any():
+            raise InputError("a node belongs to no cell", key="points", value=int(np.argmax(used == 0)))
+        determinants = jacobian_determinants(self.points[self.cells], QUADRATURE_POINTS).min(axis=1)
+        if (determinants <= 0.0).any():
+            cell = int(np.argmin(determinants))
+            place = self.points[self.cells[cell, :4]].mean(axis=0).round(3).tolist()
+            raise InputError(f"a cell is turned inside out near {place} mm", key="cells", value=cell)
+
+    def _check_regions(self) -> None:
+        count = np.zeros(self.n_cells, dtype=np.int64)
+        for name, cells in self.regions.items():
+            _check_indices(cells, self.n_cells, f"regions.{name}", "cells")
+            np.add.at(count, cells, 1)
+        if (count != 1).any():
+            cell = int(np.argmax(count != 1))
+            problem = "a cell is in no region" if count[cell] == 0 else "a cell is in two regions"
+            raise InputError(problem, key="regions", value=cell)
+
+    def _check_surface(self, name: str, triangles: IntArray) -> None:
+        _check_indices(triangles, self.n_points, f"surfaces.{name}", "nodes")
+        hosts = host_cells(self.cells, triangles)
+        if (hosts < 0).any():
+            face = triangles[np.argmin(hosts)].tolist()
+            problem = "a triangle is not the outward face of a cell"
+            raise InputError(problem, key=f"surfaces.{name}", value=face, expected="six nodes, turning outward")
+
+
+def _frozen(values: Any, kind: npt.DTypeLike, shape: tuple[int | None, ...], key: str) -> Any:
+    """Return a read-only copy of the wanted type and shape (None: any length)."""
+    array = np.asarray(values)
+    if array.size == 0:
+        array = array.reshape(tuple(length or 0 for length in shape))
+    fits = array.ndim == len(shape) and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
+    if not fits or (kind is np.int32 and array.size and array.dtype.kind not in "iu"):
+        wanted = str(tuple("n" if length is None else length for length in shape)).replace("'", "")
+        raise InputError(
+            f"the array has shape {array.shape} and type {array.dtype}",
+            key=key,
+            expected=f"shape {wanted} of {'integers' if kind is np.int32 else 'numbers'}",
+        )
+    copy = np.array(array, dtype=kind, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+def _frozen_map(arrays: Mapping[str, Any], kind: npt.DTypeLike, shape: tuple[int | None, ...], key: str) -> Any:
+    return MappingProxyType({name: _frozen(array, kind, shape, f"{key}.{name}") for name, array in arrays.items()})
+
+
+def _check_indices(indices: IntArray, count: int, key: str, what: str) -> None:
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        wrong = int(indices.min()) if indices.min() < 0 else int(indices.max())
+        raise InputError("an index points outside the mesh", key=key, value=wrong, expected=f"{what} 0 to {count - 1}")
+
+
+def _named(things: Mapping[str, npt.NDArray[Scalar]], name: str, kind: str) -> npt.NDArray[Scalar]:
+    if name not in things:
+        available = ", ".join(sorted(things)) or f"no {kind} at all"
+        raise InputError(f"the mesh has no {kind} of this name", value=name, expected=f"one of: {available}")
+    return things[name]
