@@ -1,1 +1,1 @@
-"""One strain-energy model per file; a file put here is found by itself."""
+"""Strain-energy models, one idea a file; :func:`turgor.materials.registry.models` finds them by itself."""
