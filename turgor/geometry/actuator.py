@@ -1,0 +1,154 @@
+"""What every actuator template is: parameters with units and bounds, and a drawing with names."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self, get_args
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
+
+from turgor.common.errors import InputError
+from turgor.common.units import NonNegativeLength, PositiveLength
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The names of what a template drew into the current gmsh model.
+
+    Parameters
+    ----------
+    regions
+        Name → tags of volumes.
+    surfaces
+        Name → tags of faces on the outside of the solid.
+    markers
+        Name → points ``(k, 3)`` of a polyline on the drawing's vertices and edges; the nodes on it, in order from
+        its first point to its last, become the marker (one point: the node there).
+    curves
+        Name → points ``(j, 3)`` of a curve embedded in the solid without shaping the mesh (a fibre).
+    """
+
+    regions: Mapping[str, Sequence[int]]
+    surfaces: Mapping[str, Sequence[int]]
+    markers: Mapping[str, FloatArray] = field(default_factory=dict)
+    curves: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a template, as text for tables.
+
+    ``default`` carries its unit, ``bounds`` says what is accepted, ``source`` where the default comes from.
+    """
+
+    name: str
+    default: str
+    bounds: str
+    meaning: str
+    source: str
+
+
+class Actuator(BaseModel, ABC):
+    """A parametric actuator: quantities in, a drawing with names out; it does not change after construction.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, lies outside its bounds or contradicts another.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+    template: ClassVar[str]
+    """The name by which case files and commands call the template."""
+
+    def __init__(self, **parameters: Any) -> None:
+        try:
+            super().__init__(**parameters)
+        except ValidationError as error:
+            raise _input_error(error, type(self)) from None
+        self.check()
+
+    @classmethod
+    def parameters(cls) -> list[Parameter]:
+        """Return the parameters with default, bounds, meaning and source, in the order of declaration."""
+        schema = cls.model_json_schema()["properties"]
+        return [_describe(name, field, schema[name]) for name, field in cls.model_fields.items()]
+
+    def changed(self, **parameters: Any) -> Self:
+        """Return a copy with some `parameters` changed; raise InputError as the constructor does."""
+        return type(self)(**{**self.model_dump(), **parameters})
+
+    @property
+    @abstractmethod
+    def default_size(self) -> float:
+        """Element size in mm with which the shape is meshed if nothing else is asked for."""
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise InputError naming a parameter that contradicts the others."""
+
+    @abstractmethod
+    def draw(self) -> Shape:
+        """Add the solid to the current gmsh model and return the names of its parts."""
+
+
+def parameter(default: Any, meaning: str, source: str, *, ge: int | None = None, le: int | None = None) -> Any:
+    """Declare a template's parameter.
+
+    Parameters
+    ----------
+    default
+        Text with a unit where the type is a quantity.
+    meaning
+        What it measures, and between what.
+    source
+        Where the default comes from.
+    ge, le
+        Bounds of a whole number.
+    """
+    return Field(default=default, description=meaning, json_schema_extra={"source": source}, ge=ge, le=le)
+
+
+_LIMITS = {
+    "minimum": "at least",
+    "maximum": "at most",
+    "exclusiveMinimum": "greater than",
+    "exclusiveMaximum": "less than",
+}
+_QUANTITY_BOUNDS = ((PositiveLength, "greater than 0 mm"), (NonNegativeLength, "at least 0 mm"))
+
+
+def _describe(name: str, info: FieldInfo, schema: Mapping[str, Any]) -> Parameter:
+    limits = [f"{word} {schema[key]}" for key, word in _LIMITS.items() if key in schema]
+    limits += [text for kind, text in _QUANTITY_BOUNDS if get_args(kind)[1] in info.metadata]
+    if "enum" in schema:
+        limits.append("one of: " + ", ".join(schema["enum"]))
+    return Parameter(
+        name=name,
+        default={True: "yes", False: "no"}[info.default] if schema["type"] == "boolean" else str(info.default),
+        bounds=", ".join(limits),
+        meaning=info.description or "",
+        source=str(schema["source"]),
+    )
+
+
+def _input_error(error: ValidationError, kind: type[Actuator]) -> InputError:
+    """Make one message of pydantic's list: the first problem in full, the others by name."""
+    first, *others = error.errors(include_url=False)
+    key = ".".join(str(part) for part in first["loc"]) or None
+    also = f" (also wrong: {', '.join(str(other['loc'][0]) for other in others if other['loc'])})" if others else ""
+    if first["type"] == "extra_forbidden":
+        expected = "one of: " + ", ".join(kind.model_fields)
+        return InputError(f"'{kind.template}' has no such parameter{also}", key=key, expected=expected)
+    cause = first.get("ctx", {}).get("error")
+    if first["type"] == "value_error" and cause is not None:
+        return InputError(f"{cause}{also}", key=key)
+    return InputError(f"{first['msg']}{also}", key=key, value=first["input"])
