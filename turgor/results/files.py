@@ -1,0 +1,73 @@
+"""Files that are either whole or absent, whenever the process dies; and a lock against two writers."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from turgor.common.errors import InputError
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+PARTIAL = ".part"
+"""Suffix of a file that is still being written."""
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary path to write to; it takes the name `path` once its bytes are on the disk."""
+    partial = path.with_name(path.name + PARTIAL)
+    yield partial
+    with partial.open("rb+") as stream:
+        os.fsync(stream.fileno())
+    partial.replace(path)
+    _sync_folder(path.parent)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 text file in one piece."""
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="")
+
+
+def _sync_folder(folder: Path) -> None:
+    # The new name itself is only safe once the folder is flushed; Windows cannot open a folder for that.
+    if sys.platform != "win32":
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+class FolderLock:
+    """The right to write into a folder; the system gives it back when the process ends, however it ends.
+
+    Raises
+    ------
+    InputError
+        If another writer holds the folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._stream = (folder / ".lock").open("a+b")
+        try:
+            if sys.platform == "win32":
+                msvcrt.locking(self._stream.fileno(), msvcrt.LK_NBLCK, 1)
+            else:
+                fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._stream.close()
+            raise InputError(
+                "another run is writing into this folder", file=folder, expected="another folder, or that run to end"
+            ) from error
+
+    def release(self) -> None:
+        """Let another writer have the folder; a second call does nothing."""
+        self._stream.close()

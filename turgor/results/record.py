@@ -1,0 +1,76 @@
+"""One equilibrium state, as the solver hands it to the store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from turgor.common.errors import InputError
+from turgor.mesh.mesh import Mesh
+
+FloatArray = npt.NDArray[np.float64]
+
+SOLVER_FACTS = ("iterations", "factorisations", "stable", "residual", "wall_s")
+"""What :attr:`StepRecord.solver` tells about the step, in the order of the columns of ``history.csv``."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepRecord:
+    """An equilibrium state of n nodes and m elements, and how the solver reached it.
+
+    Parameters
+    ----------
+    index
+        Number of the step, counted from 0.
+    fraction
+        Load parameter, 0 (nothing applied) to 1 (target).
+    loads
+        Value of every load: ``{"pressure:cavity": 0.03}`` in MPa, dimensionless factors under their own name.
+    displacement
+        Shape ``(n, 3)``, mm.
+    element_pressure
+        Mean pressure of each element, shape ``(m,)``, MPa.
+    element_dilatation
+        Current volume over reference volume of each element, shape ``(m,)``.
+    von_mises
+        Nodal von Mises stress of the Cauchy stress, shape ``(n,)``, MPa.
+    von_mises_max, von_mises_p99
+        Largest value over the quadrature points and 99th percentile by volume, MPa.
+    cavity_volumes
+        Enclosed volume of each cavity, mm³.
+    solver
+        The :data:`SOLVER_FACTS` of the step; ``stable`` is ``None`` where the solver cannot tell.
+    """
+
+    index: int
+    fraction: float
+    loads: Mapping[str, float]
+    displacement: FloatArray
+    element_pressure: FloatArray
+    element_dilatation: FloatArray
+    von_mises: FloatArray
+    von_mises_max: float
+    von_mises_p99: float
+    cavity_volumes: Mapping[str, float]
+    solver: Mapping[str, Any]
+
+    def check(self, mesh: Mesh) -> None:
+        """Raise InputError unless the arrays have the shapes that `mesh` asks for."""
+        n, m = mesh.n_points, mesh.n_cells
+        shapes = {"displacement": (n, 3), "element_pressure": (m,), "element_dilatation": (m,), "von_mises": (n,)}
+        for name, shape in shapes.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise InputError("the array does not fit the mesh", key=name, value=found, expected=f"shape {shape}")
+        missing = [name for name in SOLVER_FACTS if name not in self.solver]
+        if missing:
+            raise InputError(f"the solver's facts lack {', '.join(missing)}", key="solver")
+
+
+ARRAY_FIELDS = ("displacement", "element_pressure", "element_dilatation", "von_mises")
+PLAIN_FIELDS = tuple(field.name for field in fields(StepRecord) if field.name not in ARRAY_FIELDS)
+"""The fields of a record that JSON can hold; the others are arrays."""

@@ -1,0 +1,133 @@
+"""How the cross-sections of a slender body turn: the rotation of slices from the mount to the tip.
+
+A body is sliced between its surfaces ``mount`` and ``tip-face``, along the marker ``centreline`` where it has one, else
+along the straight line between the two faces. Each slice gets the rotation that fits its displacement best (Kabsch,
+1976, *Acta Cryst.* A32, 922), so that bulging walls do not count. Between neighbours the rotation is small, and adding
+up these small rotations tells 311° from −49°.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from turgor.mesh.mesh import Mesh
+
+FloatArray = npt.NDArray[np.float64]
+
+MOUNT, TIP_FACE, CENTRELINE = "mount", "tip-face", "centreline"
+
+SLICES = 32
+"""Slices between the mount and the tip face; a body may turn by less than 180° from one to the next."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How the tip face has turned against the mount, in rad.
+
+    Parameters
+    ----------
+    bending
+        Angle by which the axis of the body has turned; counts on beyond π, never negative.
+    twist
+        Rotation about the axis, added up along the body; positive turns right-handed about the axis mount → tip.
+    """
+
+    bending: float
+    twist: float
+
+
+def turn(mesh: Mesh, displacement: FloatArray) -> Turn:
+    """Return how the tip face has turned against the mount.
+
+    With Q_i the rotations of the slices, a the body's axis and t_i the axis carried along, each small rotation vector
+    log(Q_{i+1} Q_iᵀ) is split along and across t_i. Twist is the sum of the parts along. The sum of the parts across
+    gives the axis and the number of whole turns of the bending, whose angle is that between the axes of the two faces.
+
+    Parameters
+    ----------
+    mesh
+        With the surfaces ``mount`` and ``tip-face``.
+    displacement
+        Shape ``(n, 3)``, mm.
+
+    Raises
+    ------
+    InputError
+        If the mesh lacks one of the two surfaces.
+    """
+    rotations = _slice_rotations(mesh, displacement)
+    axis = _axis(mesh)
+    steps = (rotations[1:] * rotations[:-1].inv()).as_rotvec()
+    carried = rotations.apply(axis)
+    middle = carried[1:] + carried[:-1]
+    middle /= np.linalg.norm(middle, axis=1)[:, None]
+    along = np.einsum("ij,ij->i", steps, middle)
+    across = (steps - along[:, None] * middle).sum(axis=0)
+    return Turn(_unwrapped_angle(carried[0], carried[-1], across), float(along.sum()))
+
+
+def seen_from_mount(mesh: Mesh, displacement: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return `vector` ``(3,)`` as it looks to someone who turns with the mount."""
+    nodes = mesh.surface_nodes(MOUNT)
+    rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
+    assert rotation is not None, "a surface never lies on a line"
+    return np.asarray(rotation.T @ vector)
+
+
+def _unwrapped_angle(start: FloatArray, end: FloatArray, accumulated: FloatArray) -> float:
+    """Angle from `start` to `end` about the vector `accumulated`, with as many whole turns as its length tells."""
+    normal = np.cross(start, end)
+    angle = math.copysign(math.atan2(float(np.linalg.norm(normal)), float(start @ end)), float(normal @ accumulated))
+    whole_turns = round((float(np.linalg.norm(accumulated)) - angle) / (2.0 * math.pi))
+    return abs(angle + 2.0 * math.pi * whole_turns)
+
+
+def _slice_rotations(mesh: Mesh, displacement: FloatArray) -> Rotation:
+    groups: list[npt.NDArray[Any]] = [mesh.surface_nodes(MOUNT), *_slices(mesh), mesh.surface_nodes(TIP_FACE)]
+    fits = [_best_rotation(mesh.points[nodes], displacement[nodes]) for nodes in groups]
+    return Rotation.from_matrix(np.array([fit for fit in fits if fit is not None]))
+
+
+def _slices(mesh: Mesh) -> list[npt.NDArray[np.intp]]:
+    """Nodes of each slice, by the station of the reference line that is nearest."""
+    line = _reference_line(mesh)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    stations = (np.arange(SLICES) + 0.5) / SLICES * lengths[-1]
+    places = np.column_stack([np.interp(stations, lengths, coordinate) for coordinate in line.T])
+    nearest = KDTree(places).query(mesh.points)[1]
+    return [np.flatnonzero(nearest == station) for station in range(SLICES)]
+
+
+def _reference_line(mesh: Mesh) -> FloatArray:
+    if CENTRELINE in mesh.markers and len(mesh.marker(CENTRELINE)) > 1:
+        return np.asarray(mesh.points[mesh.marker(CENTRELINE)])
+    ends = [mesh.points[mesh.surface_nodes(name)].mean(axis=0) for name in (MOUNT, TIP_FACE)]
+    return np.array(ends)
+
+
+def _axis(mesh: Mesh) -> FloatArray:
+    """Unit vector along the reference line where it reaches the tip face."""
+    line = _reference_line(mesh)
+    direction = line[-1] - line[-2]
+    return np.asarray(direction / np.linalg.norm(direction))
+
+
+def _best_rotation(points: FloatArray, displacement: FloatArray) -> FloatArray | None:
+    """Least-squares rotation of `points` to their displaced places; None where they lie on a line."""
+    if len(points) < 3:
+        return None
+    before = points - points.mean(axis=0)
+    after = before + displacement - displacement.mean(axis=0)
+    spread = np.linalg.svd(before, compute_uv=False)
+    if spread[1] < 1e-3 * spread[0]:
+        return None
+    left, _, right = np.linalg.svd(after.T @ before)
+    left[:, 2] *= np.linalg.det(left @ right)
+    return np.asarray(left @ right)

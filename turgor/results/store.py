@@ -1,0 +1,304 @@
+"""The folder of a run: every step is on the disk, whole, before the next one begins.
+
+=====================  ==============================================================================================
+``store.json``         version of this layout and the names of the run's measures; it makes the folder a run's folder
+``case.yaml``          the resolved case
+``mesh.npz``           the mesh with all its names
+``steps/0003.npz``     exact state of step 3 and its row of the history; written last, so that its presence means the
+                       step is complete
+``steps/0003.vtu``     the same for ParaView
+``result.pvd``         list of the ``.vtu`` files over the load parameter
+``history.csv``        one row a step
+``summary.json``       what came out, once the run has ended
+``fit.json``           the fit of the material, if the run made one
+=====================  ==============================================================================================
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+from xml.sax.saxutils import quoteattr
+
+import yaml
+
+from turgor.common.errors import InputError
+from turgor.mesh.mesh import Mesh
+from turgor.results import measures as known_measures
+from turgor.results.archive import Row, load_mesh, load_record, load_row, save_mesh, save_record, save_vtu
+from turgor.results.files import PARTIAL, FolderLock, replacing, write_text
+from turgor.results.history import as_csv, row
+from turgor.results.record import StepRecord
+from turgor.results.summary import as_json
+
+LAYOUT = 1
+"""Version of the layout of the folder."""
+
+_STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
+_PVD, _HISTORY, _SUMMARY, _FIT = "result.pvd", "history.csv", "summary.json", "fit.json"
+
+
+class RunStore:
+    """The stored states of one run; made by :meth:`create`, :meth:`resume` (to add steps) or :meth:`open` (to read)."""
+
+    def __init__(self, folder: Path, mesh: Mesh, measures: tuple[str, ...], lock: FolderLock | None) -> None:
+        self.folder = folder
+        self.mesh = mesh
+        self.measures = measures
+        self._lock = lock
+        self._rows = [load_row(self._step_file(index)) for index in range(_finished_steps(folder))]
+
+    @classmethod
+    def create(
+        cls,
+        folder: str | Path,
+        mesh: Mesh,
+        case: Mapping[str, Any] | str,
+        *,
+        measures: Iterable[str] | None = None,
+        overwrite: bool = False,
+    ) -> Self:
+        """Begin a run in a folder, which is made if need be.
+
+        Parameters
+        ----------
+        folder
+            Where the files go. Files that are not a run's are left alone.
+        mesh
+            The mesh of the run.
+        case
+            The resolved case, as YAML text or as plain data.
+        measures
+            Names of the measures of the history; left out, all that the mesh has the names for.
+        overwrite
+            Replace the run that is in the folder.
+
+        Raises
+        ------
+        InputError
+            If the folder holds a run already, is being written by another run, cannot be written, or a measure is
+            unknown or impossible on this mesh.
+        """
+        place = Path(folder)
+        chosen = known_measures.available(mesh) if measures is None else tuple(measures)
+        known_measures.check(chosen, mesh)
+        if (place / _STORE).exists() and not overwrite:
+            raise InputError(
+                "the folder holds a run already",
+                file=place,
+                expected="another folder, or to resume or overwrite that run",
+            )
+        try:
+            (place / _STEPS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"the folder cannot be made: {error.strerror}", file=place) from error
+        lock = FolderLock(place)
+        _remove_run(place)
+        text = case if isinstance(case, str) else yaml.safe_dump(dict(case), sort_keys=False, allow_unicode=True)
+        write_text(place / _CASE, text)
+        save_mesh(place / _MESH, mesh)
+        write_text(place / _STORE, json.dumps({"layout": LAYOUT, "measures": chosen}) + "\n")
+        store = cls(place, mesh, chosen, lock)
+        store._write_tables()
+        return store
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Self:
+        """Open a run to read it, also while another process writes it.
+
+        Raises
+        ------
+        InputError
+            If the folder holds no run, or a file of it is missing or damaged.
+        """
+        return cls(Path(folder), *_read_store(Path(folder)), lock=None)
+
+    @classmethod
+    def resume(cls, folder: str | Path) -> Self:
+        """Open a run to add steps; what a killed process left half-written is removed.
+
+        Raises
+        ------
+        InputError
+            As :meth:`open`; also if another process is writing into the folder.
+        """
+        place = Path(folder)
+        content = _read_store(place)
+        with _locked(place) as lock:
+            for leftover in [*place.glob(f"*{PARTIAL}"), *place.glob(f"{_STEPS}/*{PARTIAL}")]:
+                leftover.unlink()
+            store = cls(place, *content, lock=lock)
+            (place / _SUMMARY).unlink(missing_ok=True)
+            store._write_tables()
+        return store
+
+    def append(self, record: StepRecord) -> None:
+        """Write the next step; when this returns, no crash can lose it.
+
+        Raises
+        ------
+        InputError
+            If the record does not fit the mesh or is not the next one, or the store was opened only to read.
+        """
+        self._check_writable()
+        record.check(self.mesh)
+        if record.index != len(self._rows):
+            raise InputError(
+                "this is not the next step", key="index", value=record.index, expected=str(len(self._rows))
+            )
+        entry = row(record, self.mesh, self.measures)
+        path = self._step_file(record.index)
+        save_vtu(path.with_suffix(".vtu"), self.mesh, record)
+        save_record(path, record, entry)
+        self._rows.append(entry)
+        self._write_tables()
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        """Write ``summary.json`` and let go of the folder; raise InputError if a key of the summary is missing."""
+        self._check_writable()
+        write_text(self.folder / _SUMMARY, as_json(summary))
+        self.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let another process write into the folder; from now on this store only reads."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
+    def write_fit(self, fit: Mapping[str, Any]) -> None:
+        """Write the fit of the material (what ``turgor fit --json`` prints, with its curves) for the report."""
+        self._check_writable()
+        write_text(self.folder / _FIT, json.dumps(fit, indent=2, ensure_ascii=False) + "\n")
+
+    @property
+    def n_steps(self) -> int:
+        """Number of finished steps."""
+        return len(self._rows)
+
+    @property
+    def history(self) -> list[Row]:
+        """The rows of ``history.csv``, in order."""
+        return [dict(entry) for entry in self._rows]
+
+    @property
+    def case_text(self) -> str:
+        """The resolved case as YAML text."""
+        return _read_text(self.folder / _CASE)
+
+    @property
+    def summary(self) -> dict[str, Any] | None:
+        """The summary, or None while the run has not ended."""
+        return _read_json(self.folder / _SUMMARY) if (self.folder / _SUMMARY).exists() else None
+
+    @property
+    def fit(self) -> dict[str, Any] | None:
+        """The fit of the material, or None if the run has none."""
+        return _read_json(self.folder / _FIT) if (self.folder / _FIT).exists() else None
+
+    def load(self, index: int) -> StepRecord:
+        """Read one step; raise InputError if there is none of that number or its file is damaged."""
+        if not 0 <= index < self.n_steps:
+            raise InputError(
+                "the run has no such step", file=self.folder, value=index, expected=f"0 to {self.n_steps - 1}"
+            )
+        record = load_record(self._step_file(index))
+        record.check(self.mesh)
+        return record
+
+    def last(self) -> StepRecord | None:
+        """Read the last finished step; None if there is none yet."""
+        return self.load(self.n_steps - 1) if self._rows else None
+
+    def records(self) -> Iterator[StepRecord]:
+        """Read the steps one after the other."""
+        return (self.load(index) for index in range(self.n_steps))
+
+    def _step_file(self, index: int) -> Path:
+        return _step_file(self.folder, index)
+
+    def _check_writable(self) -> None:
+        if self._lock is None:
+            raise InputError("the run is open only to be read", file=self.folder, expected="RunStore.create or .resume")
+
+    def _write_tables(self) -> None:
+        write_text(self.folder / _HISTORY, as_csv(self._rows))
+        sets = "".join(
+            f'    <DataSet timestep="{entry["fraction"]!r}" file={quoteattr(f"{_STEPS}/{index:04d}.vtu")}/>\n'
+            for index, entry in enumerate(self._rows)
+        )
+        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        with replacing(self.folder / _PVD) as partial:
+            partial.write_text(f"{head}{sets}  </Collection>\n</VTKFile>\n", encoding="utf-8")
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[FolderLock]:
+    """Lock the folder for good, or not at all where the block fails."""
+    lock = FolderLock(folder)
+    try:
+        yield lock
+    except BaseException:
+        lock.release()
+        raise
+
+
+def _step_file(folder: Path, index: int) -> Path:
+    return folder / _STEPS / f"{index:04d}.npz"
+
+
+def _finished_steps(folder: Path) -> int:
+    count = 0
+    while _step_file(folder, count).exists():
+        count += 1
+    return count
+
+
+def _read_store(folder: Path) -> tuple[Mesh, tuple[str, ...]]:
+    if not (folder / _STORE).is_file():
+        raise InputError(
+            "the folder holds no run", file=folder, expected=f"a folder that 'turgor run' wrote ({_STORE})"
+        )
+    content = _read_json(folder / _STORE)
+    if content.get("layout") != LAYOUT:
+        raise InputError(
+            "the run has another layout", file=folder / _STORE, value=content.get("layout"), expected=str(LAYOUT)
+        )
+    mesh = load_mesh(folder / _MESH)
+    measures = tuple(content.get("measures", ()))
+    known_measures.check(measures, mesh)
+    return mesh, measures
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("the file is missing or damaged", file=path) from error
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(_read_text(path))
+    except json.JSONDecodeError as error:
+        raise InputError(f"the file is damaged: {error}", file=path) from error
+    if not isinstance(content, dict):
+        raise InputError("the file is damaged", file=path, expected="a JSON object")
+    return content
+
+
+def _remove_run(folder: Path) -> None:
+    """Remove the files of an earlier run, the one that makes the folder a run's folder first."""
+    for name in (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT):
+        (folder / name).unlink(missing_ok=True)
+    for pattern in ("*.npz", "*.vtu", f"*{PARTIAL}"):
+        for path in (folder / _STEPS).glob(pattern):
+            path.unlink()
