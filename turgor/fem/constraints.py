@@ -1,0 +1,158 @@
+"""Dirichlet conditions: which degrees of freedom are given, in which frame, and their values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.common.errors import InputError
+from turgor.fem.supports import Clamped, Prescribed, Sliding, face_normals
+from turgor.mesh.mesh import Mesh
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SAME_DIRECTION = 1e-6
+"""Sine of the angle below which two constrained directions at a node count as one."""
+
+CREASE = np.cos(np.radians(25.0))
+"""Faces of a sliding surface that meet at a node at a larger angle constrain it each in its own direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """The given components of displacement, node by node.
+
+    Attributes
+    ----------
+    fixed
+        Which components are given, ``(n_points, 3)``, in the node's frame.
+    value
+        Their values at load fraction one, ``(n_points, 3)``, mm, in the node's frame.
+    frame_nodes, frames
+        The nodes whose constrained directions are not the axes ``(k,)``, and their orthonormal frames ``(k, 3, 3)``:
+        one direction a row, the constrained ones first.
+    """
+
+    fixed: NDArray[np.bool_]
+    value: Floats
+    frame_nodes: Ints
+    frames: Floats
+
+    def to_frames(self, vectors: Floats) -> Floats:
+        """Return nodal `vectors` ``(n_points, 3)`` with components in the nodes' frames."""
+        return self._turned(vectors, "kij,kj->ki")
+
+    def from_frames(self, vectors: Floats) -> Floats:
+        """Return nodal `vectors` ``(n_points, 3)``, given in the nodes' frames, in x, y and z."""
+        return self._turned(vectors, "kji,kj->ki")
+
+    def imposed(self, u: Floats, fraction: float) -> Floats:
+        """Return `u` with the given components set to their values at a load fraction."""
+        local = self.to_frames(u)
+        local[self.fixed] = fraction * self.value[self.fixed]
+        return self.from_frames(local)
+
+    @property
+    def moves(self) -> bool:
+        """Whether any given value differs from zero."""
+        return bool(np.any(self.value))
+
+    def _turned(self, vectors: Floats, rule: str) -> Floats:
+        turned = vectors.copy()
+        if len(self.frame_nodes):
+            turned[self.frame_nodes] = np.einsum(rule, self.frames, vectors[self.frame_nodes])
+        return turned
+
+
+def compile_constraints(mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed]) -> Constraints:
+    """Turn supports into constraints on the nodes of `mesh`.
+
+    Raises
+    ------
+    InputError
+        If two supports prescribe different displacements of one node in one direction.
+    """
+    rows: dict[int, list[tuple[Floats, float, str]]] = {}
+    for support in supports:
+        for node, direction, value in _conditions(mesh, support):
+            rows.setdefault(node, []).append((direction, value, support.surface))
+    fixed = np.zeros((mesh.n_points, 3), bool)
+    value = np.zeros((mesh.n_points, 3))
+    nodes, frames = [], []
+    for node, conditions in rows.items():
+        basis, given = _independent(conditions, mesh.points[node])
+        axes = np.argmax(np.abs(basis), axis=1)
+        if np.allclose(np.abs(basis[np.arange(len(basis)), axes]), 1.0, atol=1e-12):
+            fixed[node, axes] = True
+            value[node, axes] = given * np.sign(basis[np.arange(len(basis)), axes])
+        else:
+            fixed[node, : len(basis)] = True
+            value[node, : len(basis)] = given
+            nodes.append(node)
+            frames.append(_completed(basis))
+    return Constraints(fixed, value, np.array(nodes, np.int32), np.array(frames).reshape(-1, 3, 3))
+
+
+def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[int, Floats, float]]:
+    axes = np.eye(3)
+    if isinstance(support, Sliding):
+        for node, normal in _node_normals(mesh.points, mesh.surface(support.surface)):
+            yield node, normal, 0.0
+        return
+    given = (0.0, 0.0, 0.0) if isinstance(support, Clamped) else support.displacement
+    for node in mesh.surface_nodes(support.surface):
+        for axis, component in zip(axes, given, strict=True):
+            if component is not None:
+                yield int(node), axis, component
+
+
+def _node_normals(points: Floats, faces: Ints) -> Iterable[tuple[int, Floats]]:
+    # Area-weighted mean normal at each node; where faces meet at a crease, one for each side of it.
+    face_normal = face_normals(points, faces).sum(axis=1)
+    groups: dict[int, list[Floats]] = {}
+    for face, normal in zip(faces, face_normal, strict=True):
+        for node in face:
+            here = groups.setdefault(int(node), [])
+            for k, other in enumerate(here):
+                if normal @ other > CREASE * np.linalg.norm(normal) * np.linalg.norm(other):
+                    here[k] = other + normal
+                    break
+            else:
+                here.append(normal)
+    for node, normals in groups.items():
+        for normal in normals:
+            unit = normal / np.linalg.norm(normal)
+            # A flat face that looks along an axis is to say so exactly.
+            yield node, np.where(np.abs(unit) < 1e-9, 0.0, unit)
+
+
+def _independent(conditions: list[tuple[Floats, float, str]], place: Floats) -> tuple[Floats, Floats]:
+    """Orthonormalise the constrained directions at one node, checking that the given values agree."""
+    basis: list[Floats] = []
+    given: list[float] = []
+    for direction, wanted, surface in conditions:
+        known = np.array([b @ direction for b in basis])
+        rest = direction - sum((c * b for c, b in zip(known, basis, strict=True)), np.zeros(3))
+        left = wanted - float(known @ np.array(given)) if basis else wanted
+        size = float(np.linalg.norm(rest))
+        if size > SAME_DIRECTION:
+            basis.append(rest / size)
+            given.append(left / size)
+        elif abs(left) > 1e-9 * max(1.0, abs(wanted)):
+            raise InputError(
+                "two supports prescribe different displacements of the same node near "
+                f"({place[0]:.3g}, {place[1]:.3g}, {place[2]:.3g}) mm",
+                key=f"supports.{surface}",
+                expected="supports that agree where their surfaces meet",
+            )
+    return np.array(basis), np.array(given)
+
+
+def _completed(basis: Floats) -> Floats:
+    """Add directions until `basis` ``(k, 3)`` is an orthonormal frame."""
+    _, _, rest = np.linalg.svd(basis)
+    return np.vstack([basis, rest[len(basis) :]])

@@ -1,0 +1,81 @@
+"""Block stiffnesses in the frames of obliquely supported nodes, and their products with nodal fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.constraints import Constraints
+from turgor.fem.term import pack_symmetric
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+class BlockFrames:
+    """Turns the few blocks that touch a node with a frame of its own into that frame: K ← T K Tᵀ.
+
+    Parameters
+    ----------
+    constraints
+        Where the frames stand.
+    groups
+        The nodes of each term's blocks, ``(n_blocks, nodes_per_block)``.
+    """
+
+    def __init__(self, constraints: Constraints, groups: Sequence[Ints]) -> None:
+        frames = np.broadcast_to(np.eye(3), (len(constraints.fixed), 3, 3))
+        framed = np.zeros(len(frames), bool)
+        if len(constraints.frame_nodes):
+            frames = frames.copy()
+            frames[constraints.frame_nodes] = constraints.frames
+            framed[constraints.frame_nodes] = True
+        self._touched = [np.flatnonzero(framed[group].any(axis=1)) for group in groups]
+        self._turns = [_block_diagonal(frames[group[rows]]) for group, rows in zip(groups, self._touched, strict=True)]
+
+    def turn(self, group: int, packed: Floats) -> None:
+        """Turn the packed blocks ``(n_blocks, packed)`` of one group, in place."""
+        rows, turn = self._touched[group], self._turns[group]
+        if len(rows):
+            blocks = unpack_symmetric(packed[rows], turn.shape[1])
+            turned = np.empty((len(rows), packed.shape[1]))
+            pack_symmetric(turn @ blocks @ turn.transpose(0, 2, 1), turned)
+            packed[rows] = turned
+
+
+def unpack_symmetric(packed: Floats, size: int) -> Floats:
+    """Return the full symmetric blocks ``(n_blocks, size, size)`` of packed upper triangles."""
+    row, col = np.triu_indices(size)
+    blocks = np.empty((len(packed), size, size))
+    blocks[:, row, col] = packed
+    blocks[:, col, row] = packed
+    return blocks
+
+
+def _block_diagonal(frames: Floats) -> Floats:
+    """Return ``(k, 3n, 3n)`` from the frames ``(k, n, 3, 3)`` of each block's nodes."""
+    k, n = frames.shape[:2]
+    turn = np.zeros((k, n, 3, n, 3))
+    at = np.arange(n)
+    turn[:, at, :, at, :] = frames.transpose(1, 0, 2, 3)
+    return turn.reshape(k, 3 * n, 3 * n)
+
+
+@nb.njit(cache=True)
+def block_products(nodes, packed, field, out):  # type: ignore[no-untyped-def]
+    """Add the products of packed symmetric blocks with a nodal ``field (n_points, 3)`` to ``out (n_points, 3)``."""
+    n = 3 * nodes.shape[1]
+    for block in range(len(nodes)):
+        at = 0
+        for row in range(n):
+            a, i = nodes[block, row // 3], row % 3
+            for col in range(row, n):
+                b, k = nodes[block, col // 3], col % 3
+                value = packed[block, at]
+                out[a, i] += value * field[b, k]
+                if col != row:
+                    out[b, k] += value * field[a, i]
+                at += 1

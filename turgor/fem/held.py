@@ -1,0 +1,81 @@
+"""Is every part of the body held? A free rigid motion makes the stiffness singular, so it is refused beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from turgor.common.errors import InputError
+from turgor.fem.constraints import Constraints
+from turgor.fem.supports import ElasticSupport, face_normals
+from turgor.mesh.mesh import Mesh
+
+Floats = NDArray[np.float64]
+
+MOTIONS = ("shift along x", "shift along y", "shift along z", "turn about x", "turn about y", "turn about z")
+NEGLIGIBLE = 1e-8
+
+
+def check_held(mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport]) -> None:
+    """Refuse a body, or a part of one, that can move as a whole without meeting a support.
+
+    Raises
+    ------
+    InputError
+        Naming a motion that nothing stops.
+    """
+    count, part = connected_components(_node_graph(mesh), directed=False)
+    nodes, directions = _held_directions(mesh, constraints, springs)
+    size = float(np.ptp(mesh.points, axis=0).max())
+    for k in range(count):
+        here = part[nodes] == k
+        centre = mesh.points[part == k].mean(axis=0)
+        arm = (mesh.points[nodes[here]] - centre) / size
+        rows = np.hstack([directions[here], np.cross(arm, directions[here])])
+        free = _free_motion(rows)
+        if free is not None:
+            what = (
+                "the body" if count == 1 else f"part {k + 1} of {count} of the body, which is not joined to the rest,"
+            )
+            raise InputError(
+                f"{what} is free to {free}", key="supports", expected="supports that stop every rigid motion"
+            )
+
+
+def _node_graph(mesh: Mesh) -> sp.csr_matrix:
+    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
+    return sp.csr_matrix((np.ones(len(first), np.int8), (first, mesh.cells.ravel())), shape=(mesh.n_points,) * 2)
+
+
+def _held_directions(
+    mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport]
+) -> tuple[NDArray[np.intp], Floats]:
+    """Return the nodes ``(k,)`` and unit directions ``(k, 3)`` along which something holds them."""
+    frames = np.broadcast_to(np.eye(3), (mesh.n_points, 3, 3)).copy()
+    frames[constraints.frame_nodes] = constraints.frames
+    node, component = np.nonzero(constraints.fixed)
+    nodes, directions = [node], [frames[node, component]]
+    for support in springs:
+        faces = mesh.surface(support.surface)
+        if support.normal_only:
+            normal = face_normals(mesh.points, faces).sum(axis=1)
+            unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+            nodes.append(faces[:, :3].ravel())
+            directions.append(np.repeat(unit, 3, axis=0))
+        else:
+            corners = np.unique(faces)
+            nodes.append(np.repeat(corners, 3))
+            directions.append(np.tile(np.eye(3), (len(corners), 1)))
+    return np.concatenate(nodes), np.concatenate(directions)
+
+
+def _free_motion(rows: Floats) -> str | None:
+    """Return the name of the rigid motion that the held directions ``(k, 6)`` do not stop, if there is one."""
+    values, motions = np.linalg.eigh(rows.T @ rows)
+    if len(rows) and values[0] > NEGLIGIBLE * values[-1]:
+        return None
+    return MOTIONS[int(np.argmax(np.abs(motions[:, 0])))]

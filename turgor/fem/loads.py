@@ -1,0 +1,104 @@
+"""Loads: what the user says, and the dead ones as terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.elements import TET10, TRI6
+from turgor.fem.state import State
+from turgor.fem.supports import face_normals
+from turgor.fem.term import NO_NODES
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Air pressure in a closed cavity, MPa above the surroundings; it grows with the load fraction."""
+
+    cavity: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Weight of every region: `acceleration` in mm/s², acting in full from the start."""
+
+    acceleration: Vector
+
+
+@dataclass(frozen=True)
+class Traction:
+    """A dead force per reference area on a surface, MPa; it keeps its direction and grows with the load fraction."""
+
+    surface: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Force:
+    """A dead force, N in total, spread evenly over the reference area of a surface; grows with the load fraction."""
+
+    surface: str
+    vector: Vector
+
+
+Load = Pressure | Gravity | Traction | Force
+
+
+class DeadLoad:
+    """−factor · f · u with constant nodal forces f: gravity and dead tractions.
+
+    Parameters
+    ----------
+    nodal
+        The forces at factor one, ``(n_points, 3)``, N.
+    channel
+        Place of the factor in ``State.loads``.
+    """
+
+    nodes = NO_NODES
+
+    def __init__(self, nodal: Floats, channel: int) -> None:
+        self.nodal = nodal
+        self.channel = channel
+
+    def energy(self, state: State) -> float:
+        """Return −factor · f · u, N mm."""
+        return -float(state.loads[self.channel] * np.vdot(self.nodal, state.u))
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add −factor · f, N."""
+        out -= state.loads[self.channel] * self.nodal
+
+    def load_gradient(self, state: State, out: Floats) -> None:
+        """Add −f, N."""
+        del state
+        out -= self.nodal
+
+    def stiffness(self, state: State, out: Floats) -> None:
+        """Fill nothing: a dead load has no stiffness."""
+
+
+def body_force(cells: Ints, dV: Floats, density: float, acceleration: Vector, out: Floats) -> None:
+    """Add the nodal forces ``∫ ρ g N dV`` of ten-node tetrahedra ``(m, 10)`` to ``out (n_points, 3)``.
+
+    `dV` ``(m, q)`` are the volumes at the quadrature points and `density` is in t/mm³.
+    """
+    share = dV @ TET10.shape_at_quadrature
+    mass = density * np.bincount(cells.ravel(), share.ravel(), minlength=len(out))
+    out += mass[:, None] * np.asarray(acceleration)
+
+
+def surface_force(points: Floats, faces: Ints, traction: Vector, out: Floats) -> float:
+    """Add the nodal forces ``∫ t N dA`` of a dead traction to ``out (n_points, 3)`` and return the area, mm²."""
+    area = np.linalg.norm(face_normals(points, faces), axis=2) * TRI6.weights
+    share = area @ TRI6.shape_at_quadrature
+    lumped = np.bincount(faces.ravel(), share.ravel(), minlength=len(out))
+    out += lumped[:, None] * np.asarray(traction)
+    return float(area.sum())

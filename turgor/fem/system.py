@@ -1,0 +1,224 @@
+"""The discrete system: a mesh with materials, supports and loads, ready to be brought into equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.common.errors import InputError
+from turgor.fem.cavity import Cavity
+from turgor.fem.constraints import compile_constraints
+from turgor.fem.frames import BlockFrames, block_products
+from turgor.fem.held import check_held
+from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
+from turgor.fem.pattern import SparsePattern, packed_size
+from turgor.fem.solid import Solid
+from turgor.fem.state import State
+from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
+from turgor.fem.term import Term
+from turgor.fem.threads import prefer_light_threads
+from turgor.materials.hyperelastic import Hyperelastic
+from turgor.mesh.mesh import Mesh
+
+Floats = NDArray[np.float64]
+
+
+class System:
+    """The total potential energy Π(u) of an actuator as a sum of terms, and its derivatives on the free components.
+
+    Parameters
+    ----------
+    mesh
+        The body.
+    materials
+        One material for each region of the mesh, by name.
+    supports
+        What holds the body.
+    loads
+        What acts on it; each has one value in ``State.loads``, named in :attr:`load_names`.
+
+    Raises
+    ------
+    InputError
+        If a region has no material or a material no region, a name is unknown, a cavity is open, gravity acts on a
+        region without density, or the body is free to move as a whole.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        materials: Mapping[str, Hyperelastic],
+        supports: Sequence[Support] = (),
+        loads: Sequence[Load] = (),
+    ) -> None:
+        prefer_light_threads()
+        self.mesh = mesh
+        self.solids = _solids(mesh, materials)
+        self.loads = tuple(loads)
+        self.load_names = _load_names(self.loads)
+        held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
+        springs = [s for s in supports if isinstance(s, ElasticSupport)]
+        self.constraints = compile_constraints(mesh, held)
+        beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only) for s in springs]
+        check_held(mesh, self.constraints, springs)
+        self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
+        dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead)
+
+        free = ~self.constraints.fixed.ravel()
+        groups = [term.nodes for term in self.terms]
+        self.pattern = SparsePattern(mesh.n_points, 3, groups, free)
+        self._frames = BlockFrames(self.constraints, groups)
+        self._packed = np.empty(self.pattern.packed_offsets[-1])
+        self._values = np.empty(self.pattern.n_stored)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of unknown displacement components."""
+        return self.pattern.n_free
+
+    def reference_state(self) -> State:
+        """Return the undeformed state without loads."""
+        return State(np.zeros_like(self.mesh.points), np.ones(self.mesh.n_cells), np.zeros(len(self.loads)))
+
+    def loads_at(self, fraction: float) -> Floats:
+        """Return the loads ``(n_loads,)`` at a load fraction: weight in full, the others in proportion."""
+        values = []
+        for load in self.loads:
+            full = load.value if isinstance(load, Pressure) else 1.0
+            values.append(full if isinstance(load, Gravity) else fraction * full)
+        return np.array(values)
+
+    @property
+    def loaded_at_start(self) -> bool:
+        """Whether something acts already at load fraction zero (weight)."""
+        return bool(np.any(self.loads_at(0.0)))
+
+    def energy(self, state: State) -> float:
+        """Return Π, N mm."""
+        return sum(term.energy(state) for term in self.terms)
+
+    def forces(self, state: State) -> tuple[Floats, float]:
+        """Return ∂Π/∂u ``(n_points, 3)``, N, and the size of the largest term in it: what it is small against."""
+        total = np.zeros_like(state.u)
+        scale = 0.0
+        for term in self.terms:
+            part = np.zeros_like(state.u)
+            term.force(state, part)
+            total += part
+            scale = max(scale, float(np.linalg.norm(part)))
+        return total, scale
+
+    def stiffness(self, state: State) -> Floats:
+        """Return the stored values of ∂²Π/∂u² on the free degrees of freedom, in the pattern's order.
+
+        The array is used again by the next call.
+        """
+        for k, term in enumerate(self.terms):
+            block = self._block(k)
+            if block.size:
+                term.stiffness(state, block)
+                self._frames.turn(k, block)
+        self.pattern.sum_blocks(self._packed, self._values)
+        return self._values
+
+    def stiffness_times(self, du: Floats) -> Floats:
+        """Return the stiffness assembled last times a nodal field ``(n_points, 3)``, fixed components included."""
+        local = self.constraints.to_frames(du)
+        product = np.zeros_like(du)
+        for k, term in enumerate(self.terms):
+            if term.nodes.shape[1] > 1 and len(term.nodes):
+                block_products(term.nodes, self._block(k), local, product)
+        return self.constraints.from_frames(product)
+
+    def free_part(self, nodal: Floats) -> Floats:
+        """Return the free components ``(n_dofs,)`` of a nodal vector field ``(n_points, 3)``."""
+        return self.constraints.to_frames(nodal).ravel()[self.pattern.free]
+
+    def nodal(self, free: Floats) -> Floats:
+        """Return the nodal field ``(n_points, 3)`` with the given free components, zero elsewhere."""
+        field = np.zeros(self.mesh.points.size)
+        field[self.pattern.free] = free
+        return self.constraints.from_frames(field.reshape(-1, 3))
+
+    def updated_dilatation(self, state: State, du: Floats) -> Floats:
+        """Return every element's dilatation after Newton's step `du`, linearised at `state`, ``(n_cells,)``."""
+        dilatation = state.dilatation.copy()
+        for solid in self.solids:
+            dilatation[solid.index] = solid.updated_dilatation(state, du)
+        return dilatation
+
+    def dilatation(self, u: Floats) -> Floats:
+        """Return every element's ratio of deformed to reference volume, ``(n_cells,)``."""
+        dilatation = np.ones(self.mesh.n_cells)
+        for solid in self.solids:
+            dilatation[solid.index] = solid.dilatation(u)
+        return dilatation
+
+    def element_pressure(self, state: State) -> Floats:
+        """Return U'(θ) of every element, ``(n_cells,)``, MPa: its mean stress, positive in tension."""
+        pressure = np.empty(self.mesh.n_cells)
+        for solid in self.solids:
+            pressure[solid.index] = solid.material.volumetric.pressure(state.dilatation[solid.index])
+        return pressure
+
+    def worst_jacobian(self, u: Floats) -> tuple[float, int]:
+        """Return the smallest det F over all quadrature points and the cell where it is."""
+        return min(solid.worst_jacobian(u) for solid in self.solids)
+
+    def _block(self, k: int) -> Floats:
+        begin, end = self.pattern.packed_offsets[k : k + 2]
+        nodes = self.terms[k].nodes
+        return self._packed[begin:end].reshape(len(nodes), packed_size(3 * nodes.shape[1]))
+
+    def _cavity(self, load: Pressure, channel: int) -> Cavity:
+        self.mesh.enclosed_volume(load.cavity)  # refuses an open surface
+        return Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity)
+
+    def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
+        nodal = np.zeros_like(self.mesh.points)
+        if isinstance(load, Gravity):
+            for solid in self.solids:
+                if solid.material.density is None:
+                    raise InputError("gravity acts on a material without density", key="density")
+                body_force(solid.nodes, solid.dV, solid.material.density, load.acceleration, nodal)
+        else:
+            area = surface_force(self.mesh.points, self.mesh.surface(load.surface), load.vector, nodal)
+            if isinstance(load, Force):
+                nodal /= area
+        return DeadLoad(nodal, channel)
+
+
+def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> list[Solid]:
+    for name in materials:
+        mesh.region(name)
+    missing = sorted(set(mesh.regions) - set(materials))
+    if missing:
+        raise InputError(
+            f"no material is given for region '{missing[0]}'",
+            key="materials",
+            expected=f"one for each of {', '.join(mesh.regions)}",
+        )
+    return [
+        Solid(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material)
+        for name, material in materials.items()
+    ]
+
+
+def _load_names(loads: Sequence[Load]) -> tuple[str, ...]:
+    names: list[str] = []
+    for load in loads:
+        if isinstance(load, Pressure):
+            name = f"pressure:{load.cavity}"
+        elif isinstance(load, Gravity):
+            name = "gravity"
+        else:
+            name = f"{type(load).__name__.lower()}:{load.surface}"
+        if name in names and isinstance(load, Pressure):
+            raise InputError(
+                "the cavity is given two pressures", key="loads", value=load.cavity, expected="one for each cavity"
+            )
+        names.append(name if name not in names else f"{name}#{names.count(name) + 1}")
+    return tuple(names)

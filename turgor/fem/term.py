@@ -1,0 +1,61 @@
+"""What every term of the potential energy offers, and the few operations that terms share."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.state import State
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+class Term(Protocol):
+    """A part of the total potential energy.
+
+    ``nodes (n_blocks, nodes_per_block)`` are the blocks of nodes that the stiffness couples; a term that is linear in
+    the displacement has none.
+    """
+
+    nodes: Ints
+
+    def energy(self, state: State) -> float:
+        """Return the energy in N mm."""
+        ...
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the derivative of the energy with respect to the displacement to ``out (n_points, 3)``, N."""
+        ...
+
+    def stiffness(self, state: State, out: Floats) -> None:
+        """Fill the packed upper triangles of the block stiffnesses, ``out (n_blocks, packed)``, N/mm."""
+        ...
+
+
+class Loaded(Protocol):
+    """A term whose size follows a load: ``channel`` is its place in ``State.loads``."""
+
+    channel: int
+
+    def load_gradient(self, state: State, out: Floats) -> None:
+        """Add the derivative of :meth:`Term.force` with respect to the load's value to ``out (n_points, 3)``."""
+        ...
+
+
+NO_NODES = np.empty((0, 1), np.int32)
+
+
+def add_at_nodes(nodes: Ints, values: Floats, out: Floats) -> None:
+    """Add block vectors ``values (n_blocks, nodes_per_block, 3)`` to ``out (n_points, 3)``."""
+    flat = nodes.ravel()
+    for i in range(3):
+        out[:, i] += np.bincount(flat, values[:, :, i].ravel(), minlength=len(out))
+
+
+def pack_symmetric(blocks: Floats, out: Floats) -> None:
+    """Write the upper triangles of ``blocks (n_blocks, n, n)`` into ``out (n_blocks, packed)``."""
+    row, col = np.triu_indices(blocks.shape[-1])
+    out[:] = blocks[..., row, col]

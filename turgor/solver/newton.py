@@ -1,0 +1,171 @@
+"""Newton's method with the element dilatations as unknowns of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.common.errors import SolverError
+from turgor.fem.state import State
+from turgor.fem.system import System
+from turgor.solver.linear import LinearSolver, SingularMatrixError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """When to stop.
+
+    Attributes
+    ----------
+    tolerance
+        An equilibrium is reached when the norm of the out-of-balance force is below this part of the norm of the largest
+        of the forces in it (internal, pressure, weight …), reactions included. It has no unit.
+    max_iterations
+        Linear solves allowed for one equilibrium.
+    """
+
+    tolerance: float = 1e-7
+    max_iterations: int = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state in equilibrium and how it was found.
+
+    Attributes
+    ----------
+    state
+        The state; its dilatations are those of its displacement.
+    fraction
+        The load fraction.
+    residuals
+        Relative out-of-balance force before each iteration and at the end.
+    factorisations
+        Number of matrices factorised.
+    negative_pivots
+        Negative eigenvalues of the tangent at (or next to) the equilibrium; ``None`` if the linear solver cannot tell.
+    """
+
+    state: State
+    fraction: float
+    residuals: tuple[float, ...]
+    factorisations: int
+    negative_pivots: int | None
+
+    @property
+    def iterations(self) -> int:
+        """Number of linear solves."""
+        return len(self.residuals) - 1
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether Π has a minimum here; ``None`` if the linear solver cannot tell."""
+        return None if self.negative_pivots is None else self.negative_pivots == 0
+
+
+class NotConvergedError(SolverError):
+    """Newton's method found no equilibrium from where it started."""
+
+
+SMALLEST_DAMPING = 1 / 32
+NEAR = 1e-2
+"""A tangent at a relative residual below this speaks for the equilibrium that the iteration then reaches."""
+
+
+def find_equilibrium(
+    system: System,
+    linear: LinearSolver,
+    guess: State,
+    fraction: float,
+    options: NewtonOptions,
+    on_iteration: Callable[[int, float], None] | None = None,
+) -> Equilibrium:
+    """Find the equilibrium at a load fraction from a guess.
+
+    Each iteration solves with the tangent whose geometric part takes the pressures that the previous one predicted
+    (``State.dilatation``), while the right-hand side is the exact out-of-balance force. Eliminating the
+    pressures from Newton's method on the mixed problem gives the same iteration, so that it needs no
+    more steps at a bulk modulus of 1e5 μ than at μ.
+
+    Raises
+    ------
+    NotConvergedError
+        With the residual history and the worst element, if no equilibrium is reached.
+    """
+    state = guess.with_(loads=system.loads_at(fraction))
+    pending = system.constraints.imposed(state.u, fraction) - state.u
+    moving = bool(np.any(pending))
+    residuals: list[float] = []
+    while True:
+        force, scale = system.forces(state)
+        residual = system.free_part(force)
+        relative = _relative(float(np.linalg.norm(residual)), scale, system)
+        residuals.append(relative)
+        if on_iteration is not None:
+            on_iteration(len(residuals) - 1, relative)
+        if not np.isfinite(relative):
+            raise _failure("the forces are not finite any more", system, state, residuals)
+        if relative <= options.tolerance and not moving:
+            return _accepted(system, linear, state, fraction, residuals)
+        if len(residuals) > options.max_iterations:
+            raise _failure(f"no equilibrium within {options.max_iterations} iterations", system, state, residuals)
+        try:
+            linear.factorise(system.stiffness(state))
+        except SingularMatrixError as error:
+            raise _failure("the stiffness is singular", system, state, residuals) from error
+        if moving:
+            residual = residual + system.free_part(system.stiffness_times(pending))
+        du = system.nodal(linear.solve(-residual))
+        if moving:
+            du += pending
+            moving = False
+        state = _advanced(system, state, du, residuals)
+
+
+def _advanced(system: System, state: State, du: Floats, residuals: list[float]) -> State:
+    """Return the state after the step, shortened where it would turn an element inside out."""
+    damping = 1.0
+    while damping >= SMALLEST_DAMPING:
+        step = damping * du
+        trial = state.u + step
+        worst, _ = system.worst_jacobian(trial)
+        if worst > 0.0:
+            return state.with_(u=trial, dilatation=system.updated_dilatation(state, step))
+        damping *= 0.5
+    raise _failure("an element would turn inside out", system, state.with_(u=state.u + du), residuals)
+
+
+def _accepted(
+    system: System, linear: LinearSolver, state: State, fraction: float, residuals: list[float]
+) -> Equilibrium:
+    state = state.with_(dilatation=system.dilatation(state.u))
+    factorisations = len(residuals) - 1
+    if factorisations == 0 or residuals[-2] > NEAR:
+        linear.factorise(system.stiffness(state))
+        factorisations += 1
+    return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots)
+
+
+def _relative(norm: float, scale: float, system: System) -> float:
+    """Return the residual relative to the forces; forces of rounding errors only count as none."""
+    stiffest = max(solid.material.shear_modulus for solid in system.solids)
+    floor = 1e-12 * stiffest * float(np.ptp(system.mesh.points, axis=0).max()) ** 2
+    return norm / max(scale, floor)
+
+
+def _failure(reason: str, system: System, state: State, residuals: list[float]) -> NotConvergedError:
+    facts: dict[str, object] = {"residuals": [float(f"{r:.3g}") for r in residuals]}
+    if np.all(np.isfinite(state.u)):
+        worst, cell = system.worst_jacobian(state.u)
+        place = system.mesh.points[system.mesh.cells[cell, :4]].mean(axis=0)
+        facts |= {
+            "worst_element": cell,
+            "worst_element_at_mm": [round(float(x), 3) for x in place],
+            "worst_det_F": worst,
+        }
+    return NotConvergedError(reason, facts=facts)

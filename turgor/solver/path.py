@@ -1,0 +1,216 @@
+"""The load path: from rest to the target through every requested load, in steps as long as convergence allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from turgor.common.errors import InputError, SolverError
+from turgor.common.log import logger
+from turgor.fem.loads import Pressure
+from turgor.fem.state import State
+from turgor.fem.system import System
+from turgor.solver.linear import LinearSolver, make_linear_solver
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+
+log = logger("solver")
+
+CUT = 0.4
+GROWTH = 1.6
+EASY = 7
+"""A step that took no more iterations than this lets the next one grow."""
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """How to walk along the load path.
+
+    Attributes
+    ----------
+    newton
+        Tolerance and iteration limit of each equilibrium.
+    largest_step, smallest_step
+        Bounds of a step in load fraction. The walk ends where not even the smallest step finds an equilibrium.
+    """
+
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+    largest_step: float = 1.0
+    smallest_step: float = 1e-3
+
+
+class StoppedShortError(SolverError):
+    """No equilibrium was found beyond the last one delivered."""
+
+
+def solve_path(
+    system: System,
+    fractions: Sequence[float],
+    *,
+    options: PathOptions | None = None,
+    start: Equilibrium | None = None,
+    on_equilibrium: Callable[[Equilibrium], None] | None = None,
+    on_progress: Callable[[float, int, float], None] | None = None,
+) -> list[Equilibrium]:
+    """Bring the system into equilibrium at each of the requested load fractions.
+
+    Parameters
+    ----------
+    system
+        The actuator.
+    fractions
+        Ascending load fractions in (0, 1] at which an equilibrium is wanted; each is hit exactly, whatever steps
+        lie between. Weight acts in full from the start, and its equilibrium at fraction 0 is delivered first.
+    options
+        Tolerances and step bounds.
+    start
+        An equilibrium of the same system to go on from; fractions up to its own are skipped.
+    on_equilibrium
+        Called with each requested equilibrium as soon as it is reached.
+    on_progress
+        Called after every iteration with the fraction aimed at, the iteration and the relative residual.
+
+    Returns
+    -------
+    list of Equilibrium
+        The requested equilibria (without `start`).
+
+    Raises
+    ------
+    InputError
+        If the fractions are not ascending numbers in (0, 1].
+    StoppedShortError
+        If the walk ends before the last fraction; what was reached until then has been delivered.
+    """
+    wanted = [float(f) for f in fractions]
+    if (
+        not wanted
+        or not all(0.0 < f <= 1.0 for f in wanted)
+        or any(b <= a for a, b in zip(wanted, wanted[1:], strict=False))
+    ):
+        raise InputError("the load fractions must ascend within 0 < f ≤ 1", key="fractions", value=wanted)
+    walk = _Walk(system, options or PathOptions(), start, on_progress)
+    reached: list[Equilibrium] = []
+
+    def deliver(equilibrium: Equilibrium) -> None:
+        reached.append(equilibrium)
+        if on_equilibrium is not None:
+            on_equilibrium(equilibrium)
+
+    if start is None and system.loaded_at_start:
+        deliver(walk.settle())
+    for fraction in wanted:
+        if fraction > walk.here.fraction:
+            deliver(walk.to(fraction))
+    return reached
+
+
+class _Walk:
+    """The last two equilibria and the step length: what the next step is predicted from."""
+
+    def __init__(
+        self,
+        system: System,
+        options: PathOptions,
+        start: Equilibrium | None,
+        on_progress: Callable[[float, int, float], None] | None,
+    ) -> None:
+        self.system = system
+        self.options = options
+        self.on_progress = on_progress
+        self.linear: LinearSolver = make_linear_solver(system.pattern.row_start, system.pattern.column)
+        self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
+        self.before: Equilibrium | None = None
+        self.step = options.largest_step
+
+    def settle(self) -> Equilibrium:
+        """Find the equilibrium at load fraction zero under what acts from the start."""
+        self.here = self._attempt(0.0, self.here.state)
+        return self.here
+
+    def to(self, target: float) -> Equilibrium:
+        """Walk to the load fraction `target` and return its equilibrium, with the work of all steps on the way."""
+        iterations: list[float] = []
+        factorisations = 0
+        while self.here.fraction < target:
+            aim = min(target, self.here.fraction + self.step)
+            if target - aim < 0.2 * self.step:
+                aim = target
+            found = self._try(aim)
+            if found is None:
+                continue
+            iterations += found.residuals[:-1]
+            factorisations += found.factorisations
+            self.before, self.here = self.here, found
+        last = self.here
+        return Equilibrium(
+            last.state, last.fraction, (*iterations, last.residuals[-1]), factorisations, last.negative_pivots
+        )
+
+    def _try(self, aim: float) -> Equilibrium | None:
+        """Attempt one step; shorten the next and return ``None`` if it fails."""
+        size = aim - self.here.fraction
+        try:
+            found = self._attempt(aim, self._predicted(aim))
+        except NotConvergedError as error:
+            log.info("step to %.4g failed: %s", aim, error.reason)
+            self._shorten(size, error)
+            return None
+        if found.stable is False and self.here.stable is not False and size > 4 * self.options.smallest_step:
+            # A long step can land on an unstable branch that a shorter one would not have met.
+            log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
+            self.step = CUT * size
+            return None
+        if found.iterations <= EASY:
+            self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
+        return found
+
+    def _attempt(self, aim: float, guess: State) -> Equilibrium:
+        def report(iteration: int, residual: float) -> None:
+            if self.on_progress is not None:
+                self.on_progress(aim, iteration, residual)
+
+        return find_equilibrium(self.system, self.linear, guess, aim, self.options.newton, report)
+
+    def _predicted(self, aim: float) -> State:
+        """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out."""
+        here = self.here
+        if self.before is None:
+            return here.state
+        reach = (aim - here.fraction) / (here.fraction - self.before.fraction)
+        reach = min(reach, 2.0)
+        u = here.state.u + reach * (here.state.u - self.before.state.u)
+        if self.system.worst_jacobian(u)[0] <= 0.0:
+            return here.state
+        dilatation = here.state.dilatation + reach * (here.state.dilatation - self.before.state.dilatation)
+        return here.state.with_(u=u, dilatation=dilatation)
+
+    def _shorten(self, size: float, error: NotConvergedError) -> None:
+        self.step = CUT * size
+        if self.step >= self.options.smallest_step:
+            return
+        here = self.here
+        facts: dict[str, object] = {"last_fraction": here.fraction, "last_stable": here.stable}
+        for load, name, value in zip(self.system.loads, self.system.load_names, here.state.loads, strict=True):
+            facts[f"{name}_kPa" if isinstance(load, Pressure) else name] = float(value) * (
+                1e3 if isinstance(load, Pressure) else 1.0
+            )
+        raise StoppedShortError(
+            f"no equilibrium was found beyond {_load_text(facts)} ({error.reason})",
+            advice=(
+                "The actuator may have a limit pressure there, the material may lose its stability, or the mesh may be "
+                "too coarse where it is most distorted"
+            ),
+            facts=facts | error.facts,
+        ) from error
+
+
+def _load_text(facts: dict[str, object]) -> str:
+    pressures = [f"{value:.4g} kPa in {name[9:-4]}" for name, value in facts.items() if name.startswith("pressure:")]
+    return ", ".join(pressures) or f"{facts['last_fraction']:.4g} of the load"
+
+
+def output_fractions(steps: int) -> list[float]:
+    """Return `steps` equal load fractions that end at exactly 1."""
+    return [float(f) for f in np.linspace(0.0, 1.0, steps + 1)[1:]]
