@@ -10,6 +10,7 @@ Shapes: `F` is ``(..., 3, 3)`` with any leading shape; `P` ``(..., 3, 3)``; the 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -100,6 +101,11 @@ class Hyperelastic:
             for f in dataclasses.fields(cls)
             if "constant" in f.metadata
         )
+
+    @classmethod
+    def starts(cls) -> list[tuple[float, ...]]:
+        """Return start values for a fit of the constants in which W is not linear, in the order of these."""
+        return list(itertools.product(*(constant.starts for constant in cls.constants() if not constant.linear)))
 
     @classmethod
     def of(cls, constants: Mapping[str, float]) -> Self:

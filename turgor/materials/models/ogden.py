@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -31,6 +32,12 @@ class OgdenModel(StretchModel):
             if getattr(self, f"alpha{i}") == 0:
                 raise InputError("an exponent of Ogden's model must not be zero", key=f"alpha{i}", value=0)
         super().__post_init__()
+
+    @classmethod
+    @override
+    def starts(cls) -> list[tuple[float, ...]]:
+        # The terms can be exchanged, and two equal exponents are one term.
+        return list(itertools.combinations(_STARTS, cls.terms))
 
     @property
     @override

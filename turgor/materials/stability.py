@@ -1,0 +1,137 @@
+"""Material stability of the incompressible solid: where Drucker's (Hill's) inequality holds.
+
+An increment of logarithmic strain must be met by an increment of Kirchhoff stress that does positive work,
+dτ : dε > 0 for every isochoric dε. With the energy as a function of two log strains, Ŵ(ε₁, ε₂), ε₃ = −ε₁ − ε₂, this
+says that the 2×2 matrix ∂²Ŵ/∂ε∂ε is positive definite; it is the matrix that Abaqus checks (Abaqus Theory Guide,
+"Hyperelastic material behavior"; Hill 1970).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from turgor.materials.hyperelastic import Hyperelastic
+from turgor.materials.kinematics import IDENTITY, Array
+
+_PATHS: dict[str, Callable[[Array], Array]] = {
+    "uniaxial": lambda x: np.stack([x, x**-0.5, x**-0.5], axis=-1),
+    "equibiaxial": lambda x: np.stack([x, x, x**-2.0], axis=-1),
+    "planar": lambda x: np.stack([x, np.ones_like(x), 1.0 / x], axis=-1),
+}
+"""The principal stretches of each mode against its stretch."""
+
+STRETCHES = (0.3, 6.0)
+"""The range that a verdict covers unless another is asked for."""
+
+_SAMPLES = 400
+_BISECTIONS = 40
+
+
+def principal_stretches(mode: str, stretch: Array) -> Array:
+    """Return the three principal stretches ``(..., 3)`` of a mode (``"uniaxial"``, ``"equibiaxial"``, ``"planar"``)."""
+    return _PATHS[mode](np.asarray(stretch, dtype=float))
+
+
+def drucker_matrix(material: Hyperelastic, stretches: Array) -> Array:
+    """Return ∂²Ŵ/∂ε_α∂ε_β in MPa, ``(..., 2, 2)``, at isochoric principal `stretches` ``(..., 3)``."""
+    x = np.asarray(stretches, dtype=float)
+    _, w, h = material.principal(x)
+    H = x[..., :, None] * x[..., None, :] * h + IDENTITY * (x * w)[..., None]
+    projected: Array = H[..., :2, :2] - H[..., :2, 2:] - H[..., 2:, :2] + H[..., 2:, 2:]
+    return projected
+
+
+def drucker_margin(material: Hyperelastic, stretches: Array) -> Array:
+    """Return the smallest eigenvalue of :func:`drucker_matrix` over the initial shear modulus, ``(...)``.
+
+    It is 2 in the undeformed state and positive where the material is stable.
+    """
+    eigenvalues: Array = np.asarray(np.linalg.eigvalsh(drucker_matrix(material, stretches)), dtype=float)
+    return eigenvalues[..., 0] / material.shear_modulus
+
+
+def stable_range(
+    material: Hyperelastic, mode: str, low: float = STRETCHES[0], high: float = STRETCHES[1]
+) -> tuple[float, float]:
+    """Return the stretches around 1 between which the material is stable in a mode, cut at `low` and `high`."""
+    down = _first_loss(material, mode, low)
+    up = _first_loss(material, mode, high)
+    return (low if down is None else down, high if up is None else up)
+
+
+def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
+    """Return the first stretch on the way from 1 to `end` at which stability is lost."""
+    if end == 1.0:
+        return None
+
+    def margin(log_stretch: Array) -> Array:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.nan_to_num(drucker_margin(material, principal_stretches(mode, np.exp(log_stretch))), nan=-1.0)
+
+    # Quadratic spacing: sets that are lost, are often lost within a few per cent of strain.
+    path = np.log(end) * np.linspace(0.0, 1.0, _SAMPLES) ** 2
+    lost = np.flatnonzero(~(margin(path) > 0.0))
+    if not len(lost):
+        return None
+    if lost[0] == 0:
+        return 1.0
+    good, bad = path[lost[0] - 1], path[lost[0]]
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if margin(np.array(middle)) > 0.0 else (good, middle)
+    return float(np.exp(good))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Where a material is stable: for each mode the stretches around 1, cut at the range that was examined."""
+
+    examined: tuple[float, float]
+    ranges: dict[str, tuple[float, float]]
+
+    @property
+    def stable(self) -> bool:
+        """Whether no mode is lost within the range examined."""
+        return all(span == self.examined for span in self.ranges.values())
+
+    @property
+    def lost(self) -> dict[str, dict[str, float]]:
+        """The stretches at which stability is lost, by mode and ``"compression"`` or ``"tension"``."""
+        found: dict[str, dict[str, float]] = {}
+        for mode, (low, high) in self.ranges.items():
+            places = {}
+            if low > self.examined[0]:
+                places["compression"] = low
+            if high < self.examined[1]:
+                places["tension"] = high
+            if places:
+                found[mode] = places
+        return found
+
+    def __str__(self) -> str:
+        low, high = self.examined
+        if self.stable:
+            return f"stable in stretches {low:.3g}–{high:.3g}"
+        parts = [
+            f"{mode} {'below' if side == 'compression' else 'beyond'} {stretch:.3g}"
+            for mode, places in self.lost.items()
+            for side, stretch in places.items()
+        ]
+        return f"unstable: {', '.join(parts)} (stretches {low:.3g}–{high:.3g} examined)"
+
+
+def verdict(material: Hyperelastic, low: float = STRETCHES[0], high: float = STRETCHES[1]) -> Verdict:
+    """Return where between the stretches `low` < 1 and `high` > 1 the material is stable, mode by mode."""
+    return Verdict((low, high), {mode: stable_range(material, mode, low, high) for mode in _PATHS})
+
+
+def stable_up_to(material: Hyperelastic, largest_stretch: float) -> bool:
+    """Say whether the material is stable wherever no principal stretch exceeds `largest_stretch`.
+
+    Tension in the three modes to that stretch covers their compression too: uniaxial compression is equibiaxial
+    tension of the other two directions, and the other way round.
+    """
+    return all(_first_loss(material, mode, largest_stretch) is None for mode in _PATHS)
