@@ -17,6 +17,9 @@ from turgor.common.units import NonNegativeLength, PositiveLength
 
 FloatArray = npt.NDArray[np.float64]
 
+SMALLEST, LARGEST = 1e-3, 1e5
+"""Lengths in mm between which the CAD kernel's tolerance of 1e-7 mm resolves a shape."""
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -74,6 +77,7 @@ class Actuator(BaseModel, ABC):
             super().__init__(**parameters)
         except ValidationError as error:
             raise _input_error(error, type(self)) from None
+        self._check_scale()
         self.check()
 
     @classmethod
@@ -85,6 +89,14 @@ class Actuator(BaseModel, ABC):
     def changed(self, **parameters: Any) -> Self:
         """Return a copy with some `parameters` changed; raise InputError as the constructor does."""
         return type(self)(**{**self.model_dump(), **parameters})
+
+    def _check_scale(self) -> None:
+        for name, info in type(self).model_fields.items():
+            size = getattr(self, name)
+            is_length = any(get_args(kind)[1] in info.metadata for kind, _ in _QUANTITY_BOUNDS)
+            if is_length and size != 0.0 and not SMALLEST <= size <= LARGEST:
+                expected = f"{SMALLEST:g} mm to {LARGEST:g} mm"
+                raise InputError("no actuator has this size", key=name, value=f"{size:g} mm", expected=expected)
 
     @property
     @abstractmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -47,6 +47,17 @@ def session(name: str) -> Iterator[ModuleType]:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def prism(corners: Sequence[tuple[float, float, float]], extent: tuple[float, float, float]) -> int:
+    """Draw the polygon of the `corners`, sweep it along `extent` and return the volume's tag."""
+    draw = occ()
+    points = [draw.addPoint(*corner) for corner in corners]
+    edges = [draw.addLine(start, end) for start, end in zip(points, points[1:] + points[:1], strict=True)]
+    face = draw.addPlaneSurface([draw.addCurveLoop(edges)])
+    swept = draw.extrude([(2, face)], *extent)
+    draw.remove([(2, face)])
+    return next(int(tag) for dimension, tag in swept if dimension == 3)
 
 
 def boundary(volumes: Collection[int]) -> list[int]:

@@ -22,6 +22,16 @@ LOG = logger("mesh")
 Progress = Callable[[str], None]
 """Called with the name of each stage before it begins."""
 
+MOST_CELLS = 3_000_000
+"""Meshes beyond this are refused; they need more than ten gigabytes before the first step."""
+
+PER_CIRCLE = 12
+"""Elements along a full circle, at least: longer ones would bulge through a thin wall when they are curved."""
+
+LEAST_DISTORTION = 0.1
+"""Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
+_HALVINGS = 4
+
 # gmsh's numbers for these elements, and its tetrahedron's nodes in our order.
 _TET10, _TRI6 = 11, 9
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
@@ -60,6 +70,7 @@ def generate(actuator: Actuator, size: float | None = None, *, progress: Progres
     with cad.session(actuator.template) as gmsh:
         progress("drawing")
         shape = actuator.draw()
+        _check_count(gmsh, chosen)
         progress(f"meshing with elements of {chosen:g} mm")
         _tetrahedralise(gmsh, chosen)
         progress("curving")
@@ -76,9 +87,21 @@ class _Cells:
     index: IntArray
 
 
+def _check_count(gmsh: ModuleType, size: float) -> None:
+    """Refuse a size that would fill the memory before anybody could interrupt."""
+    volume = sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
+    area = sum(gmsh.model.occ.getMass(2, tag) for _, tag in gmsh.model.getEntities(2))
+    # Regular tetrahedra and, where walls are thinner than the size, three to every triangle of the skin.
+    count = 8.5 * volume / size**3 + 3 * 2.3 * area / size**2
+    if count > MOST_CELLS:
+        problem = f"this element size needs about {count:.1g} elements"
+        expected = f"a larger size: at most {MOST_CELLS:.0g} elements"
+        raise InputError(problem, key="size", value=f"{size:g} mm", expected=expected)
+
+
 def _tetrahedralise(gmsh: ModuleType, size: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", 0.7 * size)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", PER_CIRCLE)
     try:
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
@@ -88,15 +111,16 @@ def _tetrahedralise(gmsh: ModuleType, size: float) -> None:
 
 
 def _curved(gmsh: ModuleType, shape: Shape) -> _Cells:
-    """Put the middle nodes on the geometry; untangle what that tangles, by gmsh's optimiser, then by straightening."""
+    """Put the middle nodes on the geometry and take back the curvature of elements that it would tangle."""
     gmsh.model.mesh.setOrder(2)
     mesh = _read_cells(gmsh, shape)
-    if _tangled(mesh.points, mesh.cells).any():
-        gmsh.model.mesh.optimize("HighOrder")
-        mesh = _read_cells(gmsh, shape)
-    points, count = straightened(mesh.points, mesh.cells)
+    points, count = untangled(mesh.points, mesh.cells)
     if count:
-        LOG.warning("%d of %d elements have straight edges: curved ones would be invalid", count, len(mesh.cells))
+        LOG.warning(
+            "%d of %d elements are less curved than the shape, or they would be invalid; a smaller size helps",
+            count,
+            len(mesh.cells),
+        )
     return replace(mesh, points=points)
 
 
@@ -127,15 +151,8 @@ def _named_mesh(gmsh: ModuleType, shape: Shape, mesh: _Cells) -> Mesh:
     return Mesh(mesh.points, mesh.cells, mesh.regions, surfaces, markers, shape.curves)
 
 
-def _tangled(points: FloatArray, cells: IntArray) -> npt.NDArray[np.bool_]:
-    """Say of each cell whether its Jacobian is not proved positive everywhere."""
-    coefficients = jacobian_coefficients(points[cells])
-    tangled: npt.NDArray[np.bool_] = coefficients.min(axis=1) <= 1e-6 * np.abs(coefficients).max(axis=1)
-    return tangled
-
-
-def straightened(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
-    """Straighten the edges of the cells whose curved Jacobian is not proved positive everywhere.
+def untangled(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
+    """Take back curvature, halving it up to four times and then to none, where it spoils an element.
 
     Parameters
     ----------
@@ -145,7 +162,8 @@ def straightened(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
     Returns
     -------
     points, count
-        The points with the middle nodes of those cells moved to the middles of their edges, and how many cells.
+        The points with the middle nodes of spoilt cells moved towards the middles of their edges, so that the lower
+        bound of every cell's Jacobian is at least `LEAST_DISTORTION` of its upper bound; and how many cells that took.
 
     Raises
     ------
@@ -153,17 +171,27 @@ def straightened(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
         If a cell is inside out even with straight edges.
     """
     points = points.copy()
-    straight = np.zeros(len(cells), dtype=bool)
-    while (tangled := _tangled(points, cells)).any():
-        if (tangled & straight).any():
-            cell = int(np.argmax(tangled & straight))
+    rounds = np.zeros(len(cells), dtype=np.int64)
+    first, second = np.array(EDGES).T
+    while (spoilt := _is_spoilt(points[cells])).any():
+        if (rounds[spoilt] > _HALVINGS).any():
+            cell = int(np.flatnonzero(spoilt & (rounds > _HALVINGS))[0])
             place = points[cells[cell, :4]].mean(axis=0).round(2).tolist()
             raise InputError(f"gmsh left an element inside out near {place} mm", key="size", expected="a smaller size")
-        # Straightening one cell may tangle a curved neighbour, which is then straightened in the next round.
-        straight |= tangled
-        first, second = np.array(EDGES).T
-        points[cells[tangled, 4:]] = 0.5 * (points[cells[tangled][:, first]] + points[cells[tangled][:, second]])
-    return points, int(straight.sum())
+        # A middle node belongs to several cells and must move once; a neighbour that this spoils has its turn next.
+        straight = 0.5 * (points[cells[spoilt][:, first]] + points[cells[spoilt][:, second]]).reshape(-1, 3)
+        middles, place_of = np.unique(cells[spoilt, 4:], return_index=True)
+        share = np.zeros(len(points))
+        np.maximum.at(share, cells[spoilt, 4:], np.where(rounds[spoilt] < _HALVINGS, 0.5, 1.0)[:, None])
+        points[middles] += share[middles, None] * (straight[place_of] - points[middles])
+        rounds[spoilt] += 1
+    return points, int((rounds > 0).sum())
+
+
+def _is_spoilt(nodes: FloatArray) -> npt.NDArray[np.bool_]:
+    coefficients = jacobian_coefficients(nodes)
+    spoilt: npt.NDArray[np.bool_] = coefficients.min(axis=1) < LEAST_DISTORTION * np.abs(coefficients).max(axis=1)
+    return spoilt
 
 
 def nodes_on_polyline(points: FloatArray, line: FloatArray, name: str) -> IntArray:

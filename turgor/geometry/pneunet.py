@@ -1,0 +1,142 @@
+"""The pneumatic network finger: a row of thin-walled chambers on a layered base, joined by one air passage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.units import NonNegativeLength, PositiveLength
+from turgor.geometry import cad
+from turgor.geometry.actuator import Actuator, Shape, parameter
+
+_STUDY = "Esmalipour and Ajri, PneuNet geometry study, Table 1"
+_ASSUMED = "assumed"
+
+Point = tuple[float, float, float]
+
+
+class PneuNet(Actuator):
+    """A finger along x from its mount at x = 0, chambers upward along z from the bottom at z = 0, middle plane y = 0.
+
+    Surfaces ``mount`` and ``tip-face`` (the end faces), ``cavity`` (the walls of all chambers and of the passage),
+    ``outer`` (the rest of the skin) and, of the half model, ``symmetry``; regions ``body`` and ``base`` (the second
+    bottom layer, if there is one); markers ``base``, ``tip`` and ``centreline``: the ends and all nodes of the
+    bottom's middle line, from mount to tip.
+    """
+
+    template: ClassVar[str] = "pneunet"
+
+    chambers: int = parameter(8, "number of chambers", _ASSUMED, ge=1, le=60)
+    chamber_length: PositiveLength = parameter("3 mm", "inside of a chamber along the finger", f"{_STUDY}: a")
+    chamber_width: PositiveLength = parameter("10 mm", "inside of a chamber across the finger", f"{_STUDY}: b")
+    chamber_height: PositiveLength = parameter(
+        "13 mm", "inside of a chamber from the floor of the passage", f"{_STUDY}: h"
+    )
+    gap: PositiveLength = parameter("2 mm", "distance between the outsides of two chambers", f"{_STUDY}: distance l_e")
+    wall: PositiveLength = parameter("2 mm", "thickness of the chamber walls that face the gaps", f"{_STUDY}: S")
+    side_wall: PositiveLength = parameter("2 mm", "thickness of the chamber walls at both sides", f"{_STUDY}: S")
+    top_wall: PositiveLength = parameter("2 mm", "thickness of the chamber walls on top", f"{_STUDY}: S")
+    end_wall: PositiveLength = parameter("3 mm", "thickness of the solid at mount and tip", _ASSUMED)
+    tunnel_height: PositiveLength = parameter("2 mm", "height of the air passage", _ASSUMED)
+    tunnel_width: PositiveLength = parameter("4 mm", "width of the air passage", _ASSUMED)
+    tunnel_roof: PositiveLength = parameter("2 mm", "thickness of the solid over the passage in a gap", _ASSUMED)
+    first_layer: PositiveLength = parameter("2 mm", "thickness of the bottom under the chambers", f"{_STUDY}: tb")
+    second_layer: NonNegativeLength = parameter("1 mm", "thickness of the layer below it, region 'base'", _ASSUMED)
+    symmetric: bool = parameter(False, "only the half y ≥ 0, with the surface 'symmetry'", _ASSUMED)
+
+    @property
+    def length(self) -> float:
+        """Length of the finger from mount to tip in mm."""
+        return float(2 * self.end_wall + self.chambers * self.chamber_length + (self.chambers - 1) * self._spacing)
+
+    @property
+    def default_size(self) -> float:
+        """One element through the thinnest wall of the chambers and of the passage."""
+        return float(min(self.wall, self.side_wall, self.top_wall, self.end_wall, self.first_layer, self.tunnel_roof))
+
+    @property
+    def _spacing(self) -> float:
+        """Distance between the insides of two chambers."""
+        return float(2 * self.wall + self.gap)
+
+    @property
+    def _floor(self) -> float:
+        """Height of the floor of chambers and passage."""
+        return float(self.first_layer + self.second_layer)
+
+    def check(self) -> None:
+        """Raise InputError if the passage does not fit the chambers, or its roof fills the gaps."""
+        if self.tunnel_height >= self.chamber_height:
+            self._refuse("tunnel_height", "the air passage is as high as the chambers", self.chamber_height)
+        if self.tunnel_width > self.chamber_width:
+            self._refuse("tunnel_width", "the air passage is wider than the chambers", self.chamber_width)
+        room = self.chamber_height + self.top_wall - self.tunnel_height
+        if self.tunnel_roof >= room:
+            self._refuse("tunnel_roof", "the roof of the passage fills the gaps: the chambers' walls meet", room)
+
+    def _refuse(self, key: str, problem: str, limit: float) -> None:
+        raise InputError(problem, key=key, value=f"{getattr(self, key):g} mm", expected=f"less than {limit:g} mm")
+
+    def draw(self) -> Shape:
+        """Draw the comb-shaped body less the air, on top of the base layer."""
+        occ = cad.occ()
+        half = 0.5 * self.chamber_width + self.side_wall
+        start = 0.0 if self.symmetric else -half
+        body = cad.prism([(x, start, z) for x, z in self._profile()], (0.0, half - start, 0.0))
+        air = [(3, occ.addBox(*corner, *extent)) for corner, extent in self._air(start)]
+        (solid,), _ = occ.cut([(3, body)], air)
+        solids = [solid]
+        if self.second_layer > 0.0:
+            solids.append((3, occ.addBox(0, start, 0, self.length, half - start, self.second_layer)))
+        ends = np.array([[0.0, 0.0, 0.0], [self.length, 0.0, 0.0]])
+        line = occ.addLine(*(occ.addPoint(*end) for end in ends))
+        _, pieces = occ.fragment(solids, [(1, line)])
+        occ.synchronize()
+        regions = {
+            name: [tag for _, tag in piece]
+            for name, piece in zip(("body", "base"), pieces[: len(solids)], strict=False)
+        }
+        return Shape(
+            regions=regions,
+            surfaces=self._surfaces(cad.boundary([tag for tags in regions.values() for tag in tags])),
+            markers={"base": ends[:1], "tip": ends[1:], "centreline": ends},
+        )
+
+    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
+        symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.symmetric else []
+        outside, cavity = cad.skins([face for face in faces if face not in symmetry])
+        mount, tip = (cad.faces_in_plane(outside, "x", x) for x in (0.0, self.length))
+        rest = [face for face in outside if face not in mount + tip]
+        named = {"mount": mount, "tip-face": tip, "outer": rest, "cavity": cavity, "symmetry": symmetry}
+        return {name: tags for name, tags in named.items() if tags}
+
+    def _chamber_starts(self) -> Iterator[float]:
+        """Yield the x at which the inside of each chamber begins."""
+        for number in range(self.chambers):
+            yield self.end_wall + number * (self.chamber_length + self._spacing)
+
+    def _profile(self) -> list[tuple[float, float]]:
+        """Corners (x, z) of the body's outline above the second layer: a comb."""
+        low, top = self.second_layer, self._floor + self.chamber_height + self.top_wall
+        roof = self._floor + self.tunnel_height + self.tunnel_roof
+        corners = [(0.0, low), (self.length, low), (self.length, top)]
+        for start in reversed(list(self._chamber_starts())[1:]):
+            corners += [(start - self.wall, top), (start - self.wall, roof)]
+            corners += [(start - self.wall - self.gap, roof), (start - self.wall - self.gap, top)]
+        return [*corners, (0.0, top)]
+
+    def _air(self, side: float) -> Iterator[tuple[Point, Point]]:
+        """Yield corner and extent of each chamber and of the passage, halved if the body begins at y = `side` = 0."""
+        low, high = (0.0 if side == 0.0 else -0.5), 0.5
+        starts = list(self._chamber_starts())
+        for x in starts:
+            width = self.chamber_width
+            corner = (x, low * width, self._floor)
+            yield corner, (self.chamber_length, (high - low) * width, self.chamber_height)
+        if self.chambers > 1:
+            width = self.tunnel_width
+            corner = (starts[0], low * width, self._floor)
+            yield corner, (starts[-1] - starts[0], (high - low) * width, self.tunnel_height)

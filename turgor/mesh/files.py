@@ -1,0 +1,169 @@
+"""Mesh files: write and read a mesh with all its names, as gmsh's .msh or VTK's .vtu.
+
+In a file a region is a set of ten-node tetrahedra, a surface of six-node triangles, a marker of vertices and a curve of
+lines between points of its own. In gmsh's format each is a physical group called ``region:body`` (the kind is written
+out since a region and a marker may share a name; without it the group's dimension decides). In VTK's, where cells have
+no sets, each is a cell array of that name, 1 on its cells and 0 elsewhere, by which ParaView can threshold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.mesh.faces import outward_faces
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.tet10 import FloatArray, IntArray
+
+_KINDS = {"region": "tetra10", "surface": "triangle6", "marker": "vertex", "curve": "line"}
+_DIMENSIONS = {"region": 3, "surface": 2, "marker": 0, "curve": 1}
+
+Sets = dict[tuple[str, str], IntArray]
+"""Kind and name of each set → nodes of its cells, one row a cell."""
+
+
+def write(mesh: Mesh, path: str | Path) -> None:
+    """Write a mesh with its names to a .msh (gmsh 2.2, binary) or .vtu file.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another one or the file cannot be written.
+    """
+    path = Path(path)
+    writer, _ = _format(path)
+    points, sets = _to_sets(mesh)
+    try:
+        writer(path, points, sets)
+    except OSError as error:
+        raise InputError(f"the mesh cannot be written: {error.strerror}", file=path) from error
+
+
+def read(path: str | Path) -> Mesh:
+    """Read a mesh with its names from a .msh or .vtu file of ten-node tetrahedra.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, of another kind, damaged, or holds no valid mesh.
+    """
+    path = Path(path)
+    _, reader = _format(path)
+    if not path.is_file():
+        raise InputError("there is no such file", file=path)
+    try:
+        points, sets = reader(path)
+    except InputError as error:
+        raise error.at(file=path) from error
+    except Exception as error:  # meshio's parsers fail in as many ways as a file can be damaged
+        raise InputError(f"this is not a readable mesh file: {error}", file=path) from error
+    try:
+        return _from_sets(points, sets)
+    except InputError as error:
+        raise error.at(file=path) from error
+
+
+def _to_sets(mesh: Mesh) -> tuple[FloatArray, Sets]:
+    sets: Sets = {("region", name): mesh.cells[cells] for name, cells in mesh.regions.items()}
+    sets |= {("surface", name): triangles for name, triangles in mesh.surfaces.items()}
+    sets |= {("marker", name): nodes[:, None] for name, nodes in mesh.markers.items()}
+    points = [mesh.points]
+    for name, curve in mesh.curves.items():
+        start = sum(len(block) for block in points) + np.arange(len(curve) - 1, dtype=np.int32)
+        sets["curve", name] = np.column_stack([start, start + 1])
+        points.append(curve)
+    return np.vstack(points), sets
+
+
+def _from_sets(points: FloatArray, sets: Sets) -> Mesh:
+    regions: dict[str, IntArray] = {}
+    blocks: list[IntArray] = []
+    for name, cells in _of_kind(sets, "region"):
+        start = sum(len(block) for block in blocks)
+        regions[name] = np.arange(start, start + len(cells), dtype=np.int32)
+        blocks.append(cells)
+    if not blocks:
+        raise InputError("the file names no region of ten-node tetrahedra")
+    cells = np.vstack(blocks)
+    used = np.unique(cells)
+    index = np.full(len(points), -1, dtype=np.int32)
+    index[used] = np.arange(len(used))
+    cells = index[cells]
+    return Mesh(
+        points[used],
+        cells,
+        regions,
+        {name: outward_faces(cells, index[triangles[:, :3]]) for name, triangles in _of_kind(sets, "surface")},
+        {name: index[nodes[:, 0]] for name, nodes in _of_kind(sets, "marker")},
+        {name: points[np.append(lines[:, 0], lines[-1, 1])] for name, lines in _of_kind(sets, "curve")},
+    )
+
+
+def _of_kind(sets: Sets, wanted: str) -> Iterator[tuple[str, IntArray]]:
+    return ((name, cells) for (kind, name), cells in sets.items() if kind == wanted)
+
+
+def _write_msh(path: Path, points: FloatArray, sets: Sets) -> None:
+    numbers = [np.full(len(cells), number) for number, cells in enumerate(sets.values(), start=1)]
+    names = {f"{kind}:{name}": np.array([n, _DIMENSIONS[kind]]) for n, (kind, name) in enumerate(sets, start=1)}
+    blocks = [(_KINDS[kind], cells) for (kind, _), cells in sets.items()]
+    data = {"gmsh:physical": numbers, "gmsh:geometrical": numbers}
+    meshio.gmsh.write(path, meshio.Mesh(points, blocks, cell_data=data, field_data=names), "2.2", binary=True)
+
+
+def _read_msh(path: Path) -> tuple[FloatArray, Sets]:
+    stored = meshio.gmsh.read(path)
+    kinds = {dimension: kind for kind, dimension in _DIMENSIONS.items()}
+    sets: Sets = {}
+    for name, (number, dimension) in stored.field_data.items():
+        kind = kinds[int(dimension)]
+        blocks = [
+            block.data[physical == number]
+            for block, physical in zip(stored.cells, stored.cell_data["gmsh:physical"], strict=True)
+            if block.type == _KINDS[kind]
+        ]
+        if blocks:
+            sets[kind, name.removeprefix(f"{kind}:")] = np.vstack(blocks).astype(np.int32)
+    return stored.points, sets
+
+
+def _write_vtu(path: Path, points: FloatArray, sets: Sets) -> None:
+    blocks = [(_KINDS[kind], cells) for (kind, _), cells in sets.items()]
+    data: dict[str, list[Any]] = {
+        f"{kind}:{name}": [np.full(len(block), int(key == (kind, name)), np.int8) for key, block in sets.items()]
+        for kind, name in sets
+    }
+    meshio.vtu.write(path, meshio.Mesh(points, blocks, cell_data=data))
+
+
+def _read_vtu(path: Path) -> tuple[FloatArray, Sets]:
+    stored = meshio.vtu.read(path)
+    sets: Sets = {}
+    for array, values in stored.cell_data.items():
+        kind, _, name = array.partition(":")
+        if kind not in _KINDS:
+            continue
+        blocks = [
+            block.data[flag != 0]
+            for block, flag in zip(stored.cells, values, strict=True)
+            if block.type == _KINDS[kind]
+        ]
+        sets[kind, name] = np.vstack(blocks).astype(np.int32)
+    return stored.points, sets
+
+
+Writer = Callable[[Path, FloatArray, Sets], None]
+Reader = Callable[[Path], tuple[FloatArray, Sets]]
+_FORMATS: dict[str, tuple[Writer, Reader]] = {".msh": (_write_msh, _read_msh), ".vtu": (_write_vtu, _read_vtu)}
+
+
+def _format(path: Path) -> tuple[Writer, Reader]:
+    if path.suffix not in _FORMATS:
+        expected = "a name that ends in " + " or ".join(_FORMATS)
+        raise InputError("this kind of mesh file is not known", file=path, value=path.suffix, expected=expected)
+    return _FORMATS[path.suffix]
