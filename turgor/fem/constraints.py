@@ -81,20 +81,20 @@ def compile_constraints(mesh: Mesh, supports: Iterable[Clamped | Sliding | Presc
         for node, direction, value in _conditions(mesh, support):
             rows.setdefault(node, []).append((direction, value, support.surface))
     fixed = np.zeros((mesh.n_points, 3), bool)
-    value = np.zeros((mesh.n_points, 3))
+    values = np.zeros((mesh.n_points, 3))
     nodes, frames = [], []
     for node, conditions in rows.items():
         basis, given = _independent(conditions, mesh.points[node])
         axes = np.argmax(np.abs(basis), axis=1)
         if np.allclose(np.abs(basis[np.arange(len(basis)), axes]), 1.0, atol=1e-12):
             fixed[node, axes] = True
-            value[node, axes] = given * np.sign(basis[np.arange(len(basis)), axes])
+            values[node, axes] = given * np.sign(basis[np.arange(len(basis)), axes])
         else:
             fixed[node, : len(basis)] = True
-            value[node, : len(basis)] = given
+            values[node, : len(basis)] = given
             nodes.append(node)
             frames.append(_completed(basis))
-    return Constraints(fixed, value, np.array(nodes, np.int32), np.array(frames).reshape(-1, 3, 3))
+    return Constraints(fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, 3, 3))
 
 
 def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[int, Floats, float]]:

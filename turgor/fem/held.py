@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from turgor.common.errors import InputError
+from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import Constraints
 from turgor.fem.supports import ElasticSupport, face_normals
 from turgor.mesh.mesh import Mesh
@@ -46,6 +47,26 @@ def check_held(mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSu
             )
 
 
+def check_rim(cavity: Cavity, constraints: Constraints) -> None:
+    """Refuse a cavity whose rim may leave the symmetry plane that closes it.
+
+    Raises
+    ------
+    InputError
+        Naming the cavity and the axis across which the plane lies.
+    """
+    nodes, axes = cavity.field.rim
+    fixed = constraints.fixed[nodes, axes] & (constraints.value[nodes, axes] == 0.0)
+    fixed &= ~np.isin(nodes, constraints.frame_nodes)
+    if not fixed.all():
+        axis = "xyz"[axes[np.argmin(fixed)]]
+        raise InputError(
+            f"the cavity leaks: it ends in a plane across {axis} that nothing holds",
+            key=cavity.name,
+            expected="a sliding or clamped support on the body's surface in that plane",
+        )
+
+
 def _node_graph(mesh: Mesh) -> sp.csr_matrix:
     first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
     return sp.csr_matrix((np.ones(len(first), np.int8), (first, mesh.cells.ravel())), shape=(mesh.n_points,) * 2)
@@ -53,12 +74,13 @@ def _node_graph(mesh: Mesh) -> sp.csr_matrix:
 
 def _held_directions(
     mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport]
-) -> tuple[NDArray[np.intp], Floats]:
+) -> tuple[NDArray[np.integer], Floats]:
     """Return the nodes ``(k,)`` and unit directions ``(k, 3)`` along which something holds them."""
     frames = np.broadcast_to(np.eye(3), (mesh.n_points, 3, 3)).copy()
     frames[constraints.frame_nodes] = constraints.frames
     node, component = np.nonzero(constraints.fixed)
-    nodes, directions = [node], [frames[node, component]]
+    nodes: list[NDArray[np.integer]] = [node]
+    directions = [frames[node, component]]
     for support in springs:
         faces = mesh.surface(support.surface)
         if support.normal_only:

@@ -94,7 +94,7 @@ class Solid:
         self._deform(state.u)
         kernels.volume_gradients(self._F, self.G, self.dV, self._force)
         change = np.einsum("ean,ean->e", self._force, du[self.nodes])
-        return self._dilatation + np.asarray(change) / self.volume
+        return np.asarray(self._dilatation + change / self.volume)
 
     def cauchy_stress(self, state: State) -> Floats:
         """Return the Cauchy stress at the quadrature points in the stored symmetric order, ``(m, q, 6)``, MPa."""

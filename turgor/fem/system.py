@@ -11,7 +11,7 @@ from turgor.common.errors import InputError
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints
 from turgor.fem.frames import BlockFrames, block_products
-from turgor.fem.held import check_held
+from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
 from turgor.fem.pattern import SparsePattern, packed_size
 from turgor.fem.solid import Solid
@@ -174,8 +174,9 @@ class System:
         return self._packed[begin:end].reshape(len(nodes), packed_size(3 * nodes.shape[1]))
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
-        self.mesh.enclosed_volume(load.cavity)  # refuses an open surface
-        return Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity)
+        cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity)
+        check_rim(cavity, self.constraints)
+        return cavity
 
     def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
         nodal = np.zeros_like(self.mesh.points)

@@ -9,6 +9,7 @@ import ctypes
 import functools
 import importlib.metadata
 import os
+import weakref
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
@@ -78,6 +79,10 @@ def solver_in_use() -> type[LinearSolver]:
     return SuperLU if _mkl() is None else Pardiso
 
 
+_SYMMETRIC_INDEFINITE = -2
+_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+
+
 class Pardiso(LinearSolver):
     """MKL PARDISO for real symmetric indefinite matrices (Schenk and Gärtner 2004), nested-dissection ordering.
 
@@ -85,9 +90,6 @@ class Pardiso(LinearSolver):
     """
 
     name = "MKL PARDISO"
-
-    _SYMMETRIC_INDEFINITE = -2
-    _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
 
     def __init__(self, row_start: Ints, column: Ints) -> None:
         super().__init__(row_start, column)
@@ -98,10 +100,10 @@ class Pardiso(LinearSolver):
         self._values: Floats = np.zeros(len(column))
         self._analysed = False
         # Numbered from zero as in MKL's manual for C; what is not set here is left at zero.
+        # Left at zero, iterative refinement runs after perturbed pivots only.
         control = np.zeros(64, np.int32)
         control[0] = 1  # the entries below, not the defaults
         control[1] = 3  # nested dissection, in parallel
-        control[7] = 2  # at most two steps of iterative refinement, made only after perturbed pivots
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
         control[17] = -1  # report the number of factor entries
         control[20] = 1  # Bunch–Kaufman pivots
@@ -112,14 +114,18 @@ class Pardiso(LinearSolver):
         """Factorise; the first call also orders and analyses the pattern."""
         self._values = values
         if not self._analysed:
-            self._call(self._ANALYSE)
+            self._call(_ANALYSE)
             self._analysed = True
-        self._call(self._FACTORISE)
+            matrix = (_EMPTY, self.row_start, self.column)
+            weakref.finalize(
+                self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
+            )
+        self._call(_FACTORISE)
 
     def solve(self, right: Floats) -> Floats:
         """Solve with the newest factors."""
         solution = np.empty_like(right)
-        self._call(self._SOLVE, np.ascontiguousarray(right), solution)
+        self._call(_SOLVE, np.ascontiguousarray(right), solution)
         return solution
 
     @property
@@ -132,37 +138,56 @@ class Pardiso(LinearSolver):
         """Memory of the factors, MB, as PARDISO reports it after the analysis."""
         return float(max(self._control[14], self._control[15] + self._control[16])) / 1024
 
-    def __del__(self) -> None:
-        if getattr(self, "_analysed", False):
-            self._call(self._RELEASE)
-
     def _call(self, phase: int, right: Floats | None = None, solution: Floats | None = None) -> None:
-        empty = np.zeros(1)
-        error = ctypes.c_int32(0)
-        self._pardiso(
-            _pointer(self._handle),
-            _integer(1),
-            _integer(1),
-            _integer(self._SYMMETRIC_INDEFINITE),
-            _integer(phase),
-            _integer(self.n),
-            _pointer(self._values),
-            _pointer(self.row_start),
-            _pointer(self.column),
-            _pointer(np.zeros(1, np.int32)),
-            _integer(1),
-            _pointer(self._control),
-            _integer(0),
-            _pointer(empty if right is None else right),
-            _pointer(empty if solution is None else solution),
-            ctypes.byref(error),
+        error = _pardiso_call(
+            self._pardiso,
+            phase,
+            self._handle,
+            self._control,
+            (self._values, self.row_start, self.column),
+            (_EMPTY if right is None else right, _EMPTY if solution is None else solution),
         )
-        if error.value == -2:
+        if error == -2:
             raise SolverError("not enough memory for the factorisation", advice="A coarser mesh needs less")
-        if error.value == -4:
+        if error == -4:
             raise SingularMatrixError("the stiffness matrix is singular")
-        if error.value:
-            raise SolverError(f"PARDISO stopped with error {error.value} in phase {phase}")
+        if error:
+            raise SolverError(f"PARDISO stopped with error {error} in phase {phase}")
+
+
+_EMPTY = np.zeros(1)
+
+
+def _pardiso_call(
+    function: Any,
+    phase: int,
+    handle: NDArray[np.int64],
+    control: Ints,
+    matrix: tuple[Floats, Ints, Ints],
+    vectors: tuple[Floats, Floats],
+) -> int:
+    """Call PARDISO for one symmetric indefinite matrix and one right-hand side; return its error code."""
+    values, row_start, column = matrix
+    one, error = ctypes.c_int32(1), ctypes.c_int32(0)
+    function(
+        _pointer(handle),
+        ctypes.byref(one),
+        ctypes.byref(one),
+        ctypes.byref(ctypes.c_int32(_SYMMETRIC_INDEFINITE)),
+        ctypes.byref(ctypes.c_int32(phase)),
+        ctypes.byref(ctypes.c_int32(len(row_start) - 1)),
+        _pointer(values),
+        _pointer(row_start),
+        _pointer(column),
+        _pointer(np.zeros(1, np.int32)),
+        ctypes.byref(one),
+        _pointer(control),
+        ctypes.byref(ctypes.c_int32(0)),
+        _pointer(vectors[0]),
+        _pointer(vectors[1]),
+        ctypes.byref(error),
+    )
+    return error.value
 
 
 class SuperLU(LinearSolver):
@@ -205,7 +230,7 @@ def _mkl() -> Any | None:
     # Threads that spin after a factorisation would take the cores from the element kernels.
     os.environ.setdefault("KMP_BLOCKTIME", "0")
     for file in files:
-        if file.name.startswith(("libmkl_rt.", "mkl_rt.")) and ".so" in file.name or file.name.endswith("rt.dll"):
+        if file.name.startswith(("libmkl_rt.so", "mkl_rt.")) and not file.name.endswith((".lib", ".a")):
             try:
                 library = ctypes.CDLL(str(file.locate()))
             except OSError as error:
@@ -218,7 +243,3 @@ def _mkl() -> Any | None:
 
 def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
-
-
-def _integer(value: int) -> Any:
-    return ctypes.byref(ctypes.c_int32(value))

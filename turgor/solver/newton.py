@@ -23,8 +23,8 @@ class NewtonOptions:
     Attributes
     ----------
     tolerance
-        An equilibrium is reached when the norm of the out-of-balance force is below this part of the norm of the largest
-        of the forces in it (internal, pressure, weight …), reactions included. It has no unit.
+        An equilibrium is reached when the norm of the out-of-balance force is below this part of the norm of the
+        largest of the forces in it (internal, pressure, weight …), reactions included. It has no unit.
     max_iterations
         Linear solves allowed for one equilibrium.
     """

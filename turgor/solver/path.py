@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -84,11 +85,7 @@ def solve_path(
         If the walk ends before the last fraction; what was reached until then has been delivered.
     """
     wanted = [float(f) for f in fractions]
-    if (
-        not wanted
-        or not all(0.0 < f <= 1.0 for f in wanted)
-        or any(b <= a for a, b in zip(wanted, wanted[1:], strict=False))
-    ):
+    if not wanted or not all(0.0 < f <= 1.0 for f in wanted) or any(b <= a for a, b in itertools.pairwise(wanted)):
         raise InputError("the load fractions must ascend within 0 < f ≤ 1", key="fractions", value=wanted)
     walk = _Walk(system, options or PathOptions(), start, on_progress)
     reached: list[Equilibrium] = []

@@ -1,0 +1,74 @@
+"""Fields of an equilibrium for looking at: stress at the nodes, and its extremes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.elements import TET10
+from turgor.fem.state import State
+from turgor.fem.system import System
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class VonMises:
+    """Von Mises stress of the Cauchy stress, MPa.
+
+    Attributes
+    ----------
+    nodal
+        ``(n_points,)``: extrapolated within each element from its quadrature points, then averaged over the elements
+        that meet at the node, weighted by their volume.
+    largest
+        Over the quadrature points: at a sharp corner it grows without bound as the mesh is refined.
+    percentile_99
+        Exceeded in one per cent of the volume only.
+    """
+
+    nodal: Floats
+    largest: float
+    percentile_99: float
+
+
+def von_mises(system: System, state: State) -> VonMises:
+    """Return the von Mises stress of a state."""
+    nodal = np.zeros(system.mesh.n_points)
+    weight = np.zeros(system.mesh.n_points)
+    points, volumes = [], []
+    extrapolate = _extrapolation()
+    for solid in system.solids:
+        at_points = _von_mises(solid.cauchy_stress(state))
+        at_nodes = np.maximum(at_points @ extrapolate.T, 0.0)
+        share = np.repeat(solid.volume[:, None], solid.nodes.shape[1], axis=1)
+        nodal += np.bincount(solid.nodes.ravel(), (share * at_nodes).ravel(), minlength=len(nodal))
+        weight += np.bincount(solid.nodes.ravel(), share.ravel(), minlength=len(nodal))
+        points.append(at_points.ravel())
+        volumes.append(solid.dV.ravel())
+    values = np.concatenate(points)
+    return VonMises(nodal / weight, float(values.max()), _volume_percentile(values, np.concatenate(volumes), 0.99))
+
+
+def _von_mises(stress: Floats) -> Floats:
+    """Return √(3/2 s:s) of symmetric tensors ``(..., 6)`` stored in the order of the kernels."""
+    a, b, c = stress[..., 0], stress[..., 1], stress[..., 2]
+    shear = (stress[..., 3:] ** 2).sum(axis=-1)
+    return np.asarray(np.sqrt(0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * shear))
+
+
+def _extrapolation() -> Floats:
+    """Return the matrix ``(10, 4)`` that continues a linear function from the quadrature points to the nodes."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    middles = [(corners[a] + corners[b]) / 2 for a, b in TET10.edges]
+    nodes = np.vstack([corners, *middles])
+    linear_at = np.column_stack([np.ones(4), TET10.points])
+    return np.asarray(np.column_stack([np.ones(10), nodes]) @ np.linalg.inv(linear_at))
+
+
+def _volume_percentile(values: Floats, volumes: Floats, part: float) -> float:
+    order = np.argsort(values)
+    reached = np.cumsum(volumes[order]) >= part * volumes.sum()
+    return float(values[order][np.argmax(reached)])
