@@ -26,7 +26,10 @@ _NAMED = ("regions", "surfaces", "markers", "curves")
 
 
 def save_mesh(path: Path, mesh: Mesh) -> None:
-    """Write the mesh with all its names."""
+    """Write the mesh with all its names; unlike the exchange formats this keeps the order of the cells.
+
+    The states of a run hold one pressure a cell, in that order.
+    """
     named = {f"{kind}/{name}": array for kind in _NAMED for name, array in getattr(mesh, kind).items()}
     _save(path, {"points": mesh.points, "cells": mesh.cells, **named})
 
@@ -97,7 +100,7 @@ def _save(path: Path, arrays: Mapping[str, Any]) -> None:
 
 def _load(path: Path, build: Callable[[Mapping[str, npt.NDArray[Any]]], _Content]) -> _Content:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return build(archive)
     except FileNotFoundError as error:
         raise InputError("the file is missing from the run's folder", file=path) from error

@@ -17,7 +17,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import from_internal
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import face_fluxes
-from turgor.results.sections import CENTRELINE, MOUNT, TIP_FACE, seen_from_mount, turn
+from turgor.results.sections import CENTRELINE, MOUNT, TIP_FACE, motion, seen_from_mount
 
 FloatArray = npt.NDArray[np.float64]
 Function = Callable[[Mesh, FloatArray], float | FloatArray]
@@ -124,13 +124,13 @@ def evaluate(names: Iterable[str], mesh: Mesh, displacement: FloatArray) -> dict
 @measure("bending_angle_deg", surfaces=(MOUNT, TIP_FACE))
 def bending_angle(mesh: Mesh, displacement: FloatArray) -> float:
     """Angle in rad by which the tip face has turned against the mount; it counts on beyond 180°."""
-    return turn(mesh, displacement).bending
+    return motion(mesh, displacement).bending
 
 
 @measure("twist_deg", surfaces=(MOUNT, TIP_FACE))
 def twist(mesh: Mesh, displacement: FloatArray) -> float:
     """Rotation of the tip face about the body's axis in rad, right-handed from mount to tip, free of bending."""
-    return turn(mesh, displacement).twist
+    return motion(mesh, displacement).twist
 
 
 @measure("chord_angle_deg", surfaces=(MOUNT, TIP_FACE))
@@ -152,11 +152,10 @@ def tip_displacement(mesh: Mesh, displacement: FloatArray) -> FloatArray:
     return np.asarray(displacement[mesh.marker("tip")].mean(axis=0))
 
 
-@measure("elongation_mm", markers=(CENTRELINE,))
+@measure("elongation_mm", surfaces=(MOUNT, TIP_FACE))
 def elongation(mesh: Mesh, displacement: FloatArray) -> float:
-    """Change of the length of the marker ``centreline``, measured along its stations, mm."""
-    before = np.asarray(mesh.points[mesh.marker(CENTRELINE)])
-    return _length(centreline(mesh, displacement)) - _length(before)
+    """Change in mm of the length of the line through the centres of the body's cross-sections, mount to tip."""
+    return motion(mesh, displacement).elongation
 
 
 def centreline(mesh: Mesh, displacement: FloatArray) -> FloatArray:
@@ -178,10 +177,6 @@ def cavity_volume(mesh: Mesh, displacement: FloatArray, cavity: str) -> float:
 def max_displacement(displacement: FloatArray) -> float:
     """Return the largest length of a nodal displacement ``(n, 3)``, mm."""
     return float(np.linalg.norm(displacement, axis=1).max())
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -28,27 +28,31 @@ SLICES = 32
 
 
 @dataclass(frozen=True)
-class Turn:
-    """How the tip face has turned against the mount, in rad.
+class Motion:
+    """How the tip face has moved against the mount.
 
     Parameters
     ----------
     bending
-        Angle by which the axis of the body has turned; counts on beyond π, never negative.
+        Angle in rad by which the axis of the body has turned; counts on beyond π, never negative.
     twist
-        Rotation about the axis, added up along the body; positive turns right-handed about the axis mount → tip.
+        Rotation about the axis in rad, added up along the body; positive turns right-handed about mount → tip.
+    elongation
+        Change in mm of the length of the line through the centres of the slices.
     """
 
     bending: float
     twist: float
+    elongation: float
 
 
-def turn(mesh: Mesh, displacement: FloatArray) -> Turn:
-    """Return how the tip face has turned against the mount.
+def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
+    """Return how the tip face has moved against the mount.
 
     With Q_i the rotations of the slices, a the body's axis and t_i the axis carried along, each small rotation vector
     log(Q_{i+1} Q_iᵀ) is split along and across t_i. Twist is the sum of the parts along. The sum of the parts across
     gives the axis and the number of whole turns of the bending, whose angle is that between the axes of the two faces.
+    The length is that of circular arcs from centre to centre.
 
     Parameters
     ----------
@@ -62,15 +66,22 @@ def turn(mesh: Mesh, displacement: FloatArray) -> Turn:
     InputError
         If the mesh lacks one of the two surfaces.
     """
-    rotations = _slice_rotations(mesh, displacement)
+    rotations, before, after = _fitted_slices(mesh, displacement)
     axis = _axis(mesh)
     steps = (rotations[1:] * rotations[:-1].inv()).as_rotvec()
     carried = rotations.apply(axis)
     middle = carried[1:] + carried[:-1]
     middle /= np.linalg.norm(middle, axis=1)[:, None]
     along = np.einsum("ij,ij->i", steps, middle)
-    across = (steps - along[:, None] * middle).sum(axis=0)
-    return Turn(_unwrapped_angle(carried[0], carried[-1], across), float(along.sum()))
+    across = steps - along[:, None] * middle
+    # A circular arc of angle φ is longer than its chord by (φ/2) / sin(φ/2); np.sinc(x) is sin(πx)/(πx).
+    chords = np.einsum("ij,ij->i", np.diff(after, axis=0), middle)
+    arcs = chords / np.sinc(np.linalg.norm(across, axis=1) / (2.0 * math.pi))
+    return Motion(
+        bending=_unwrapped_angle(carried[0], carried[-1], across.sum(axis=0)),
+        twist=float(along.sum()),
+        elongation=float(arcs.sum() - (np.diff(before, axis=0) @ axis).sum()),
+    )
 
 
 def seen_from_mount(mesh: Mesh, displacement: FloatArray, vector: FloatArray) -> FloatArray:
@@ -89,10 +100,17 @@ def _unwrapped_angle(start: FloatArray, end: FloatArray, accumulated: FloatArray
     return abs(angle + 2.0 * math.pi * whole_turns)
 
 
-def _slice_rotations(mesh: Mesh, displacement: FloatArray) -> Rotation:
+def _fitted_slices(mesh: Mesh, displacement: FloatArray) -> tuple[Rotation, FloatArray, FloatArray]:
+    """Rotation of each slice and its centre before and after, ``(k, 3)``, from the mount to the tip face."""
     groups: list[npt.NDArray[Any]] = [mesh.surface_nodes(MOUNT), *_slices(mesh), mesh.surface_nodes(TIP_FACE)]
-    fits = [_best_rotation(mesh.points[nodes], displacement[nodes]) for nodes in groups]
-    return Rotation.from_matrix(np.array([fit for fit in fits if fit is not None]))
+    rotations, before, after = [], [], []
+    for nodes in groups:
+        rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
+        if rotation is not None:
+            rotations.append(rotation)
+            before.append(mesh.points[nodes].mean(axis=0))
+            after.append(before[-1] + displacement[nodes].mean(axis=0))
+    return Rotation.from_matrix(np.array(rotations)), np.array(before), np.array(after)
 
 
 def _slices(mesh: Mesh) -> list[npt.NDArray[np.intp]]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
@@ -14,6 +16,9 @@ CAVITY_PREFIX = "cavity"
 
 _QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """The four flat triangles between the corners and the middles of a six-node triangle."""
+
+_SHARP_COSINE = float(np.cos(np.radians(40.0)))
+"""Faces whose normals differ by more than 40° meet at an edge that stays sharp."""
 
 _CORNERS = np.array([[0, 1, 2]])
 
@@ -37,10 +42,36 @@ def flat_triangles(faces: IntArray, *, quartered: bool) -> IntArray:
     return faces[:, _QUARTERS if quartered else _CORNERS].reshape(-1, 3)
 
 
-def compact(triangles: IntArray) -> tuple[npt.NDArray[np.intp], IntArray]:
+def compact(triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return the nodes that `triangles` use, each once, and the triangles in terms of these."""
     nodes, inverse = np.unique(triangles, return_inverse=True)
-    return nodes, inverse.reshape(triangles.shape).astype(np.int32)
+    return nodes, np.asarray(inverse.reshape(triangles.shape), dtype=np.int32)
+
+
+def smooth_patches(points: npt.NDArray[np.float64], faces: IntArray) -> npt.NDArray[np.int32]:
+    """Return for each face the number of the patch it belongs to; patches meet at sharp edges only, shape ``(k,)``.
+
+    Drawn with nodes of its own for every patch, a body keeps its edges under smooth shading.
+
+    Parameters
+    ----------
+    points
+        Nodes at rest, shape ``(n, 3)``.
+    faces
+        Six-node triangles, shape ``(k, 6)``.
+    """
+    corners = points[faces[:, :3]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    # The middle node names the edge: the two faces of an edge are neighbours in the sorted list of middle nodes.
+    middles = faces[:, 3:].ravel()
+    owners = np.repeat(np.arange(len(faces)), 3)[np.argsort(middles, kind="stable")]
+    middles = np.sort(middles)
+    paired = np.flatnonzero(middles[1:] == middles[:-1])
+    first, second = owners[paired], owners[paired + 1]
+    smooth = np.einsum("ij,ij->i", normals[first], normals[second]) > _SHARP_COSINE
+    links = coo_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(faces), len(faces)))
+    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def _keys(faces: IntArray, n_points: int) -> npt.NDArray[np.int64]:

@@ -1,0 +1,68 @@
+"""One fixed camera that sees every state of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+_AZIMUTH, _ELEVATION = np.radians(28.0), np.radians(18.0)
+_MARGIN = 1.08
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A parallel projection.
+
+    Parameters
+    ----------
+    target
+        Point in the middle of the picture, shape ``(3,)``, mm.
+    towards
+        Unit vector from the target to the camera, shape ``(3,)``.
+    up
+        Unit vector that points up in the picture, shape ``(3,)``.
+    half_height
+        Half of the picture's height in mm.
+    side
+        Coordinate axis, 0 to 2, that the camera looks along most: the one across which the body moves least.
+    """
+
+    target: FloatArray
+    towards: FloatArray
+    up: FloatArray
+    half_height: float
+    side: int
+
+
+def camera_for(points: FloatArray, aspect: float) -> Camera:
+    """Return the camera that sees all `points` ``(n, 3)`` in a picture of width/height `aspect`.
+
+    It looks from the side at the plane of the motion, turned and raised a little so that depth shows. Up is z, or y
+    where z is the direction of least extent.
+    """
+    side = int(np.argmin(np.ptp(points, axis=0)))
+    vertical = np.eye(3)[1 if side == 2 else 2]
+    # Looking along +y with z up (and along −x or −z alike) leaves the first in-plane axis pointing right.
+    facing = np.eye(3)[side] * (-1.0 if side == 1 else 1.0)
+    across = np.cross(vertical, facing)
+    level = np.cos(_AZIMUTH) * facing + np.sin(_AZIMUTH) * across
+    towards = np.cos(_ELEVATION) * level + np.sin(_ELEVATION) * vertical
+    right = np.cross(vertical, towards)
+    right /= np.linalg.norm(right)
+    up = np.cross(towards, right)
+    seen = points @ np.column_stack([right, up])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle = 0.5 * (low + high)
+    depth = float((points @ towards).mean())
+    half_width, half_height = 0.5 * (high - low)
+    return Camera(
+        target=middle[0] * right + middle[1] * up + depth * towards,
+        towards=towards,
+        up=up,
+        half_height=float(_MARGIN * max(half_height, half_width / aspect)),
+        side=side,
+    )

@@ -1,0 +1,230 @@
+"""Interactive figures of a run, made with plotly; each function returns a figure and draws nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from turgor.results.archive import Row
+from turgor.results.camera import Camera, FloatArray
+
+ACCENT = "#1f6f8b"
+INK = "#1d2733"
+SERIES = ("#1f6f8b", "#c8553d", "#588157", "#7b5ea7", "#d99a2b", "#4c78a8", "#9d5c63", "#3a3a3a")
+"""Line colours, told apart also on paper."""
+
+COLORSCALE = "Viridis"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column of the history as an axis: its title, and the unit it is shown in."""
+
+    key: str
+    title: str
+
+
+_TIP = Quantity("tip_displacement_mm", "Tip displacement / mm")
+
+MOTION = (
+    Quantity("bending_angle_deg", "Bending angle / °"),
+    Quantity("twist_deg", "Twist / °"),
+    _TIP,
+    Quantity("elongation_mm", "Elongation / mm"),
+    Quantity("max_displacement_mm", "Largest displacement / mm"),
+    Quantity("cavity_volume_mm3", "Cavity volume / mm³"),
+    Quantity("max_von_mises_MPa", "Largest von Mises / MPa"),
+)
+"""What the load–motion curves show, most telling first."""
+
+_LOAD = (Quantity("pressure_kPa", "Pressure / kPa"), Quantity("fraction", "Load parameter"))
+_COMPONENTS = tuple((axis, f"tip_displacement_{axis}_mm") for axis in "xyz")
+_NEGLIGIBLE = 1e-3
+
+_SCENE_FILL = 0.8
+"""Units of plotly's orthographic scene, of which two make its height, that half of the body's height takes up."""
+
+
+def load_axis(history: Sequence[Row]) -> Quantity:
+    """Return the quantity that the load is told by: the pressure where there is one, else the load parameter."""
+    return next(quantity for quantity in _LOAD if all(quantity.key in entry for entry in history))
+
+
+def load_motion(history: Sequence[Row]) -> go.Figure:
+    """Return the load–motion curves: each quantity of :data:`MOTION` that the run has, over the load.
+
+    Parameters
+    ----------
+    history
+        Rows of the history, at least one; a state that is not stable has an open marker. Quantities that stay
+        negligible beside another of the same unit (the twist of a finger that only bends) are left out.
+    """
+    load = load_axis(history)
+    shown = [quantity for quantity in MOTION if _is_worth_showing(quantity.key, history)]
+    columns = 2
+    rows = -(-len(shown) // columns)
+    figure = make_subplots(rows=rows, cols=columns, horizontal_spacing=0.11, vertical_spacing=0.22 / max(rows, 1))
+    loads = [entry[load.key] for entry in history]
+    for place, quantity in enumerate(shown):
+        row, column = divmod(place, columns)
+        for trace in _traces(quantity, loads, history):
+            figure.add_trace(trace, row=row + 1, col=column + 1)
+        figure.update_xaxes(title_text=load.title, row=row + 1, col=column + 1)
+        figure.update_yaxes(title_text=quantity.title, row=row + 1, col=column + 1)
+    _finish(figure, height=320 * rows)
+    if _TIP in shown:
+        row, column = divmod(shown.index(_TIP), columns)
+        corner = figure.get_subplot(row + 1, column + 1)
+        figure.update_layout(legend={"x": corner.xaxis.domain[0], "y": corner.yaxis.domain[1]})
+    return figure
+
+
+def _is_worth_showing(key: str, history: Sequence[Row]) -> bool:
+    if key == _TIP.key:
+        return all(component in entry for entry in history for _, component in _COMPONENTS)
+    if not all(key in entry for entry in history):
+        return False
+    if key == "max_displacement_mm":
+        return not _is_worth_showing(_TIP.key, history)
+    partner = {"twist_deg": "bending_angle_deg", "bending_angle_deg": "twist_deg"}.get(key)
+    if partner is None or not all(partner in entry for entry in history):
+        return True
+    return _largest(key, history) > _NEGLIGIBLE * _largest(partner, history)
+
+
+def _largest(key: str, history: Sequence[Row]) -> float:
+    return max(abs(float(entry[key])) for entry in history)
+
+
+def _traces(quantity: Quantity, loads: Sequence[float], history: Sequence[Row]) -> list[go.Scatter]:
+    symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]
+    if quantity != _TIP:
+        values = [entry[quantity.key] for entry in history]
+        return [_line(loads, values, symbols, ACCENT, name=quantity.title, legend=False)]
+    return [
+        _line(loads, [entry[key] for entry in history], symbols, color, name=f"tip, {axis}", legend=True)
+        for (axis, key), color in zip(_COMPONENTS, SERIES, strict=False)
+    ]
+
+
+def _line(
+    x: Sequence[float], y: Sequence[float], symbols: Sequence[str], color: str, *, name: str, legend: bool
+) -> go.Scatter:
+    return go.Scatter(
+        x=list(x),
+        y=list(y),
+        name=name,
+        mode="lines+markers",
+        line={"color": color, "width": 2},
+        marker={"symbol": list(symbols), "size": 7},
+        showlegend=legend,
+        hovertemplate="%{x:.4g} · %{y:.5g}<extra>" + name + "</extra>",
+    )
+
+
+def stress_strain(fit: Mapping[str, Any]) -> go.Figure:
+    """Return the test data and every fitted curve that the fit brings.
+
+    Parameters
+    ----------
+    fit
+        What ``turgor fit --json`` prints, with ``data.strain`` and ``data.stress_MPa`` (equal lengths) and, in each of
+        ``fits``, ``curve.strain`` and ``curve.stress_MPa``.
+    """
+    figure = go.Figure()
+    data = fit["data"]
+    if "strain" in data and "stress_MPa" in data:
+        figure.add_trace(
+            go.Scatter(
+                x=list(data["strain"]),
+                y=list(data["stress_MPa"]),
+                name="test",
+                mode="markers",
+                marker={"color": INK, "size": 6, "symbol": "circle-open"},
+                hovertemplate="%{x:.4g} · %{y:.5g} MPa<extra>test</extra>",
+            )
+        )
+    for number, entry in enumerate(one for one in fit["fits"] if "curve" in one):
+        chosen = entry["model"] == fit.get("recommended")
+        figure.add_trace(
+            go.Scatter(
+                x=list(entry["curve"]["strain"]),
+                y=list(entry["curve"]["stress_MPa"]),
+                name=entry["model"] + (" (recommended)" if chosen else ""),
+                mode="lines",
+                line={"color": SERIES[number % len(SERIES)], "width": 3 if chosen else 1.5},
+                hovertemplate="%{x:.4g} · %{y:.5g} MPa<extra>" + str(entry["model"]) + "</extra>",
+            )
+        )
+    figure.update_xaxes(title_text="Nominal strain")
+    figure.update_yaxes(title_text="Nominal stress / MPa")
+    _finish(figure, height=420)
+    return figure
+
+
+def body_scene(low: FloatArray, high: FloatArray, camera: Camera, scale_max: float) -> go.Figure:
+    """Return an empty 3-D scene for a stressed body: axes, camera and colour scale; its one mesh has no nodes yet.
+
+    Parameters
+    ----------
+    low, high
+        Corners of the box that holds every state, shape ``(3,)``, mm.
+    camera
+        From where to look first.
+    scale_max
+        von Mises stress in MPa at the upper end of the colour scale.
+    """
+    body = go.Mesh3d(
+        x=[],
+        y=[],
+        z=[],
+        cmin=0.0,
+        cmax=scale_max,
+        colorscale=COLORSCALE,
+        colorbar={"title": {"text": "von Mises stress / MPa", "side": "right"}, "thickness": 16, "len": 0.75, "x": 1.0},
+        hoverinfo="skip",
+        lighting={"ambient": 0.75, "diffuse": 0.45, "specular": 0.08, "roughness": 0.8},
+        lightposition={"x": 2000.0, "y": -4000.0, "z": 6000.0},
+    )
+    size = high - low
+    margin = 0.03 * float(size.max())
+    axes = {
+        f"{name}axis": {
+            "title": {"text": f"{name} / mm"},
+            "range": [float(low[number]) - margin, float(high[number]) + margin],
+            "backgroundcolor": "#f6f8fa",
+            "gridcolor": "#dfe4ea",
+            "nticks": max(2, round(6 * float(size[number] / size.max()))),
+        }
+        for number, name in enumerate("xyz")
+    }
+    ratio = (size + 2.0 * margin) * _SCENE_FILL / camera.half_height
+    eye = {name: float(2.0 * camera.towards[number]) for number, name in enumerate("xyz")}
+    up = {name: float(round(camera.up[number])) for number, name in enumerate("xyz")}
+    scene = {
+        **axes,
+        "aspectmode": "manual",
+        "aspectratio": {name: float(ratio[number]) for number, name in enumerate("xyz")},
+        "camera": {"eye": eye, "up": up, "projection": {"type": "orthographic"}},
+    }
+    figure = go.Figure(body)
+    figure.update_layout(scene=scene)
+    _finish(figure, height=560)
+    figure.update_layout(margin={"l": 0, "r": 0, "t": 0, "b": 0})
+    return figure
+
+
+def _finish(figure: go.Figure, height: int) -> None:
+    figure.update_layout(
+        template="plotly_white",
+        height=height,
+        margin={"l": 70, "r": 20, "t": 48, "b": 60},
+        font={"family": "system-ui, sans-serif", "size": 13, "color": INK},
+        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
+    )
+    figure.update_xaxes(rangemode="tozero", showline=True, linecolor="#b8c0ca", ticks="outside", tickcolor="#b8c0ca")
+    figure.update_yaxes(showline=True, linecolor="#b8c0ca", ticks="outside", tickcolor="#b8c0ca")

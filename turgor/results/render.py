@@ -1,0 +1,129 @@
+"""The process that draws: ``python -m turgor.results.render FOLDER`` turns the job in a folder into PNG files.
+
+It is started by :mod:`turgor.results.pictures`, which writes ``job.npz`` and ``job.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyvista
+from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
+
+FloatArray = npt.NDArray[np.float64]
+
+_STRESS = "von Mises stress / MPa"
+_REFERENCE = "reference"
+_INK, _OUTLINE = "#222222", "#8a8f98"
+_SUBDIVISIONS = 2
+_UPPER_PART = 0.84
+_EDGE_ANGLE_DEG = 35.0
+
+
+def main(folder: Path) -> None:
+    """Draw the job in `folder`: ``state-0.png``, ``state-1.png``, … and ``section.png``."""
+    # Without a screen VTK falls back to EGL by itself, but warns on the way about the X server it did not find.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    vtkObject.GlobalWarningDisplayOff()
+    scene = json.loads((folder / "job.json").read_text(encoding="utf-8"))
+    with np.load(folder / "job.npz", allow_pickle=False) as job:
+        arrays = {name: job[name] for name in job.files}
+    outline = _edges(_skin(arrays, None))
+    for state, label in enumerate(scene["labels"]):
+        body = _skin(arrays, state)
+        _save(folder / f"state-{state}.png", body, outline, label, scene, arrays)
+    last = len(scene["labels"]) - 1
+    section = _section(arrays, last, scene["side"])
+    _save(folder / "section.png", section, None, f"{scene['labels'][last]}, cut open", scene, arrays)
+
+
+def _skin(arrays: dict[str, npt.NDArray[Any]], state: int | None) -> Any:
+    """The outside of the body in one state, or at rest (None), its curved faces cut into small flat ones."""
+    nodes = arrays["nodes"]
+    points = arrays["points"][nodes]
+    if state is not None:
+        points = points + arrays["displacements"][state, nodes]
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TRIANGLE: arrays["faces"]}, points)
+    if state is not None:
+        grid.point_data[_STRESS] = arrays["von_mises"][state, nodes]
+    return _smooth(grid)
+
+
+def _section(arrays: dict[str, npt.NDArray[Any]], state: int, side: int) -> Any:
+    """The half of the body behind the plane that halves its extent along the coordinate `side` at rest."""
+    reference = arrays["points"][:, side]
+    across = reference - 0.5 * (reference.min() + reference.max())
+    behind = across * -np.sign(arrays["towards"][side])
+    points = arrays["points"] + arrays["displacements"][state]
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: arrays["cells"]}, points)
+    grid.point_data[_STRESS] = arrays["von_mises"][state]
+    grid.point_data[_REFERENCE] = behind
+    return _smooth(grid.clip_scalar(scalars=_REFERENCE, value=0.0, invert=False))
+
+
+def _smooth(grid: Any) -> Any:
+    surface = grid.extract_surface(nonlinear_subdivision=_SUBDIVISIONS, algorithm="dataset_surface")
+    return surface.compute_normals(split_vertices=True, feature_angle=_EDGE_ANGLE_DEG, auto_orient_normals=False)
+
+
+def _edges(surface: Any) -> Any:
+    return surface.clean().extract_feature_edges(_EDGE_ANGLE_DEG, boundary_edges=True, manifold_edges=False)
+
+
+def _save(
+    path: Path, body: Any, outline: Any, label: str, scene: dict[str, Any], arrays: dict[str, npt.NDArray[Any]]
+) -> None:
+    plotter = pyvista.Plotter(off_screen=True, window_size=scene["size"])
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    if outline is not None and outline.n_points:
+        plotter.add_mesh(outline, color=_OUTLINE, line_width=2.0)
+    plotter.add_mesh(
+        body,
+        scalars=_STRESS,
+        cmap="viridis",
+        clim=(0.0, scene["scale_max"]),
+        smooth_shading=True,
+        split_sharp_edges=False,
+        ambient=0.25,
+        diffuse=0.75,
+        specular=0.15,
+        scalar_bar_args={
+            "title": _STRESS,
+            "vertical": False,
+            "position_x": 0.2,
+            "position_y": 0.02,
+            "width": 0.6,
+            "height": 0.13,
+            "color": _INK,
+            "title_font_size": 30,
+            "label_font_size": 26,
+            "n_labels": 3,
+            "fmt": "%.3g",
+        },
+    )
+    plotter.scalar_bars[_STRESS].SetVerticalTitleSeparation(16)
+    plotter.add_text(label, position=(24, scene["size"][1] - 60), font_size=20, color=_INK)
+    _aim(plotter.camera, scene["half_height"], arrays)
+    plotter.renderer.ResetCameraClippingRange()
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def _aim(camera: Any, half_height: float, arrays: dict[str, npt.NDArray[Any]]) -> None:
+    """Look at the target, in the upper part of the picture: the lower part belongs to the colour bar."""
+    camera.parallel_projection = True
+    camera.parallel_scale = half_height / _UPPER_PART
+    focus = arrays["target"] - (1.0 / _UPPER_PART - 1.0) * half_height * arrays["up"]
+    camera.focal_point = focus
+    camera.position = focus + 10.0 * half_height * arrays["towards"]
+    camera.up = arrays["up"]
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,223 @@
+"""The report of a stored run: one HTML file that needs nothing else, no network either."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import plotly.graph_objects as go
+import yaml
+from plotly.offline import get_plotlyjs
+
+from turgor.common.errors import MissingPackageError
+from turgor.mesh.mesh import Mesh
+from turgor.results import animation, plots
+from turgor.results.archive import Row
+from turgor.results.camera import camera_for
+from turgor.results.files import write_text
+from turgor.results.measures import cavity_volume, evaluate
+from turgor.results.pictures import draw
+from turgor.results.record import StepRecord
+from turgor.results.store import RunStore
+
+FILE_NAME = "report.html"
+
+_N_PICTURES = 5
+_SCENE_ASPECT = 1.6
+_SIGNIFICANT = 4
+
+_HEADLINES = (
+    ("pressure_kPa", "Pressure", "kPa"),
+    ("bending_angle_deg", "Bending angle", "°"),
+    ("tip_displacement_mm", "Tip displacement", "mm"),
+    ("max_displacement_mm", "Largest displacement", "mm"),
+    ("max_von_mises_MPa", "Largest von Mises stress", "MPa"),
+    ("cavity_volume_mm3", "Cavity volume", "mm³"),
+)
+
+
+@dataclass(frozen=True)
+class Card:
+    """A headline number."""
+
+    title: str
+    value: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture and what is said below it; `source` is a data address that holds the PNG file."""
+
+    caption: str
+    source: str
+
+
+def report(folder: str | Path) -> Path:
+    """Write the report of the run in `folder` from what is stored there, and return the path of the HTML file.
+
+    Where pictures cannot be drawn on this machine the report is made without them and says what is missing.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no run, or a file of it is missing or damaged.
+    """
+    store = RunStore.open(folder)
+    content: dict[str, Any] = {
+        "title": _title(store),
+        "summary": store.summary,
+        "case": store.case_text,
+        "plotly_js": get_plotlyjs(),
+        "fit": _fit_section(store.fit),
+        "history": store.history,
+        "mesh": _mesh_facts(store.mesh),
+    }
+    if store.n_steps:
+        content |= _states_section(store)
+    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
+    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment.trim_blocks = environment.lstrip_blocks = True
+    environment.filters["number"] = number
+    path = store.folder / FILE_NAME
+    write_text(path, environment.get_template("report.html").render(**content))
+    return path
+
+
+def number(value: object) -> str:
+    """Return a number as people write it: at most four significant digits, yes or no, an en dash for nothing."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (int, str)):
+        return str(value)
+    if isinstance(value, (list, tuple)):
+        return ", ".join(number(entry) for entry in value)
+    if not isinstance(value, float) or not math.isfinite(value):
+        return str(value)
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        decimals = max(0, _SIGNIFICANT - 1 - math.floor(math.log10(abs(value)))) if value else 0
+        text = f"{value:.{decimals}f}"
+        return (text.rstrip("0").rstrip(".") if decimals else text).replace("-", "−")
+    return f"{value:.{_SIGNIFICANT - 1}e}".replace("-", "−")
+
+
+def _title(store: RunStore) -> str:
+    case = yaml.safe_load(store.case_text)
+    name = case.get("name") if isinstance(case, Mapping) else None
+    return str(name or store.folder.resolve().name)
+
+
+def _states_section(store: RunStore) -> dict[str, Any]:
+    """Everything that is drawn from the states: curves, the moving body, pictures."""
+    mesh, history = store.mesh, store.history
+    load = plots.load_axis(history)
+    scale_max = _round_up(max(entry["von_mises_p99_MPa"] for entry in history))
+    surface = animation.surface_that_fits(mesh, store.n_steps)
+    shown = animation.frames_that_fit(store.n_steps, len(surface.nodes))
+    records = [store.load(index) for index in shown]
+    positions = [(mesh.points + record.displacement)[surface.nodes] for record in records]
+    box = animation.bounds([mesh.points[surface.nodes], *positions])
+    camera = camera_for(np.concatenate([mesh.points[surface.nodes], *positions]), _SCENE_ASPECT)
+    labels = [_frame_label(history[index], load) for index in shown]
+    pictures, note = _pictures(store, history, load, scale_max)
+    curve = [_rest_row(store, history[0]), *history] if history[0]["fraction"] > 0.0 else history
+    return {
+        "cards": _cards(history[-1]),
+        "motion": _as_json(plots.load_motion(curve)),
+        "scene": _as_json(plots.body_scene(box.low, box.high, camera, scale_max)),
+        "frames": animation.pack(surface, positions, records, labels, box, scale_max),
+        "load_title": load.title.split(" / ")[0],
+        "pictures": pictures,
+        "pictures_note": note,
+    }
+
+
+def _as_json(figure: go.Figure) -> str:
+    # "</" would end the script element of the page.
+    return str(figure.to_json()).replace("</", "<\\/")
+
+
+def _frame_label(entry: Row, load: plots.Quantity) -> str:
+    label = _load_label(entry, load)
+    bending = entry.get("bending_angle_deg")
+    return label if bending is None else f"{label} · bent by {bending:.1f}°"
+
+
+def _load_label(entry: Row, load: plots.Quantity) -> str:
+    value = f"{entry[load.key]:.4g}"
+    return f"{value} kPa" if load.key == "pressure_kPa" else f"load parameter {value}"
+
+
+def _cards(final: Row) -> list[Card]:
+    values = dict(final)
+    tip = [values.get(f"tip_displacement_{axis}_mm") for axis in "xyz"]
+    if None not in tip:
+        values["tip_displacement_mm"] = math.hypot(*(float(component) for component in tip if component is not None))
+        del values["max_displacement_mm"]
+    return [Card(title, number(float(values[key])), unit) for key, title, unit in _HEADLINES if key in values]
+
+
+def _rest_row(store: RunStore, first: Row) -> Row:
+    """The row of the body at rest, so that the curves begin where the motion does."""
+    rest = np.zeros_like(store.mesh.points)
+    volumes = [cavity_volume(store.mesh, rest, name) for name in store.load(0).cavity_volumes]
+    zeros = {key: 0.0 for key, value in first.items() if isinstance(value, float)}
+    volume = {"cavity_volume_mm3": sum(volumes)} if volumes else {}
+    return {**zeros, **volume, **evaluate(store.measures, store.mesh, rest), "stable": True}
+
+
+def _pictures(
+    store: RunStore, history: Sequence[Row], load: plots.Quantity, scale_max: float
+) -> tuple[list[Picture], str | None]:
+    count = store.n_steps
+    indices = sorted({max(0, round((k + 1) * count / _N_PICTURES) - 1) for k in range(_N_PICTURES)})
+    records: list[StepRecord] = [store.load(index) for index in indices]
+    labels = [_load_label(history[index], load) for index in indices]
+    try:
+        drawn = draw(store.mesh, records, labels, scale_max)
+    except MissingPackageError as error:
+        return [], str(error)
+    captions = [*labels, f"{labels[-1]}, cut open"]
+    files = [*drawn.states, drawn.section]
+    return [Picture(text, _data_address(file)) for text, file in zip(captions, files, strict=True)], None
+
+
+def _data_address(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+
+
+def _mesh_facts(mesh: Mesh) -> dict[str, Any]:
+    return {
+        "Elements": f"{mesh.n_cells} ten-node tetrahedra",
+        "Nodes": mesh.n_points,
+        "Volume / mm³": mesh.volume(),
+        "Regions": ", ".join(mesh.regions),
+        "Surfaces": ", ".join(mesh.surfaces) or "–",
+        "Markers": ", ".join(mesh.markers) or "–",
+    }
+
+
+def _fit_section(fit: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    if fit is None:
+        return None
+    return {
+        "rows": fit["fits"],
+        "recommended": fit.get("recommended"),
+        "figure": _as_json(plots.stress_strain(fit)),
+    }
+
+
+def _round_up(value: float) -> float:
+    """Round a positive number up to one with two significant digits; 1 where there is nothing to scale by."""
+    if not math.isfinite(value) or value <= 0.0:
+        return 1.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / unit * (1.0 - 1e-9)) * unit
