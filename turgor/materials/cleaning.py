@@ -87,16 +87,20 @@ def _finite(curve: Curve) -> NDArray[np.bool_]:
 
 
 def _before_break(curve: Curve) -> NDArray[np.bool_]:
-    load = np.abs(curve.stress)
+    everything = np.ones(len(curve), dtype=bool)
     if len(curve) < 3 or not _is_ascending(curve):
-        return np.ones(len(curve), dtype=bool)
-    peak = int(np.argmax(load))
-    fallen = np.flatnonzero(load[peak:] < BREAK_DROP * load[peak])
-    farther = np.abs(curve.deformation[peak:][fallen]) >= 0.98 * abs(curve.deformation[peak])
+        return everything
+    load = np.abs(curve.stress)
+    # The running median of three does not see single outliers, which are no peak.
+    smooth = np.median(np.stack([load[:-2], load[1:-1], load[2:]]), axis=0)
+    smooth = np.concatenate([[load[0]], smooth, [min(load[-1], smooth[-1])]])
+    top = int(np.argmax(smooth))
+    fallen = top + np.flatnonzero(smooth[top:] < BREAK_DROP * smooth[top])
     # A load that falls while the specimen is drawn back is unloading, not a break.
-    if not len(fallen) or not farther[0]:
-        return np.ones(len(curve), dtype=bool)
-    return np.arange(len(curve)) <= peak
+    if not len(fallen) or abs(curve.deformation[fallen[0]]) < 0.98 * abs(curve.deformation[top]):
+        return everything
+    peak = np.flatnonzero(smooth[: fallen[0]] == smooth[top])[-1]
+    return np.asarray(np.arange(len(curve)) <= peak)
 
 
 def _loading(curve: Curve) -> NDArray[np.bool_]:

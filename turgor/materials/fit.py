@@ -15,8 +15,14 @@ from turgor.materials.least_squares import Problem, solve
 from turgor.materials.measurement import MaterialTest
 from turgor.materials.registry import find_model
 from turgor.materials.registry import models as known_models
-from turgor.materials.stability import Verdict, principal_stretches, stable_up_to, verdict
+from turgor.materials.stability import Verdict, digit_sensitivity, principal_stretches, stable_up_to, verdict
 from turgor.materials.testdata import read_tests
+
+SENSITIVITY_LIMIT = 0.02
+"""Rounding the constants to four digits may change the stress by so much of its largest value."""
+
+BIAXIAL_RATIOS = (0.9, 2.0)
+"""Equibiaxial over uniaxial stress at a stretch of 1.5: neo-Hookean 1.30, Treloar's natural rubber 1.47."""
 
 Data = str | Path | MaterialTest
 
@@ -38,7 +44,25 @@ class Fit:
     r2: float
     stable: bool
     stability: Verdict | None
+    digit_sensitivity: float = np.inf
+    biaxial_ratio: float = np.nan
     remark: str = ""
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """Why this fit should not be used, most serious first; empty if nothing speaks against it."""
+        found = []
+        if not self.stable:
+            found.append("unstable in the range of the tests")
+        if not self.digit_sensitivity < SENSITIVITY_LIMIT:
+            found.append("its constants cancel each other: four digits do not fix its stress")
+        low, high = BIAXIAL_RATIOS
+        if not low <= self.biaxial_ratio <= high:
+            found.append(
+                f"its equibiaxial stress at a stretch of 1.5 is {self.biaxial_ratio:.2g} times the uniaxial one "
+                f"(elastomers: {low:g} to {high:g})"
+            )
+        return tuple(found)
 
     def as_dict(self) -> dict[str, object]:
         """Return the fit in plain values, keys ending in their unit."""
@@ -52,6 +76,7 @@ class Fit:
             "stable": self.stable,
             "stability": str(self.stability) if self.stability else self.remark,
             "initial_shear_modulus_MPa": self.material.shear_modulus if self.material else None,
+            "objections": list(self.objections),
             "remark": self.remark,
         }
 
@@ -61,7 +86,7 @@ class FitReport:
     """Every fit of one set of tests, best first, and the one that is recommended."""
 
     fits: tuple[Fit, ...]
-    recommended: str
+    recommended: str | None
     reason: str
     tests: tuple[MaterialTest, ...]
     strain_range: tuple[float, float] | None
@@ -72,9 +97,22 @@ class FitReport:
 
     @property
     def best(self) -> Hyperelastic:
-        """The material of the recommended fit."""
-        material = self[self.recommended].material
-        assert material is not None
+        """The material of the recommended fit.
+
+        Raises
+        ------
+        InputError
+            If no fit is stable in the range of the tests.
+        """
+        material = self[self.recommended].material if self.recommended else None
+        if material is None:
+            raise InputError(
+                "none of these models gives a material that is stable in the range of the tests",
+                key="models",
+                value=", ".join(fit.model for fit in self.fits),
+                file=self.tests[0].file or None,
+                expected="other models (all tries every one) or a narrower strain range",
+            )
         return material
 
     @property
@@ -115,12 +153,12 @@ def fit(
     Returns
     -------
     FitReport
-        The fits, best first, and the recommended one: the best that is stable in the range in use.
+        The fits, best first, and the recommended one: the best that is stable in the range in use, if any.
 
     Raises
     ------
     InputError
-        If the data or a name is wrong, or no model gives a stable material.
+        If the data, a name or the strain range is wrong.
     """
     kinds = _kinds(models)
     span = parse_strain_range(strain_range)
@@ -129,9 +167,8 @@ def fit(
         tests = tuple(test.within(*span) for test in tests)
     problem = Problem(tests, tuple(np.ones_like(test.stress) for test in tests))
     fits = sorted((_fit_one(kind, problem) for kind in kinds), key=lambda found: found.residual_norm)
-    best = _recommend(fits, tests)
-    reason = "smallest residual among the fits that are stable in the range in use"
-    return FitReport(tuple(fits), best.model, reason, tests, span)
+    best, reason = _recommend(fits)
+    return FitReport(tuple(fits), best.model if best else None, reason, tests, span)
 
 
 def _kinds(names: str | Sequence[str]) -> list[type[Hyperelastic]]:
@@ -197,6 +234,7 @@ def _fit_one(kind: type[Hyperelastic], problem: Problem) -> Fit:
         remark = ""
     except InputError as error:
         material, remark = None, str(error)
+    largest = largest_stretch(problem.tests)
     return Fit(
         model=kind.name,
         material=material,
@@ -204,8 +242,10 @@ def _fit_one(kind: type[Hyperelastic], problem: Problem) -> Fit:
         rmse=float(np.sqrt(squares / len(residual))),
         residual_norm=float(np.sqrt(squares)),
         r2=1.0 - squares / spread if spread > 0 else float("nan"),
-        stable=material is not None and stable_up_to(material, largest_stretch(problem.tests)),
+        stable=material is not None and stable_up_to(material, largest),
         stability=verdict(material) if material else None,
+        digit_sensitivity=digit_sensitivity(material, largest) if material else np.inf,
+        biaxial_ratio=float(material.equibiaxial(1.5) / material.uniaxial(1.5)) if material else np.nan,
         remark=remark,
     )
 
@@ -222,14 +262,16 @@ def largest_stretch(tests: Sequence[MaterialTest]) -> float:
     return largest
 
 
-def _recommend(fits: Sequence[Fit], tests: Sequence[MaterialTest]) -> Fit:
-    for candidate in fits:
-        if candidate.stable:
-            return candidate
-    raise InputError(
-        "none of these models gives a material that is stable in the range of the tests",
-        key="models",
-        value=", ".join(fit.model for fit in fits),
-        file=tests[0].file or None,
-        expected="a narrower strain range, or a model such as ogden-2 or yeoh-3",
-    )
+def _recommend(fits: Sequence[Fit]) -> tuple[Fit | None, str]:
+    """Choose the best fit, preferring those that nothing speaks against; never an unstable one."""
+    usable = [candidate for candidate in fits if candidate.stable]
+    if not usable:
+        return None, "no fit is stable in the range of the tests"
+    best = min(usable, key=lambda candidate: (len(candidate.objections), candidate.residual_norm))
+    reason = f"RMSE {best.rmse:.3g} MPa, stable as far as the tests go"
+    passed_over = [f"{fit.model}: {fit.objections[0]}" for fit in fits if fit.residual_norm < best.residual_norm]
+    if passed_over:
+        reason += ". Closer to the data, but not recommended: " + "; ".join(passed_over)
+    if best.objections:
+        reason += ". Use with care: " + "; ".join(best.objections)
+    return best, reason

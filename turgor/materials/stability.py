@@ -135,3 +135,23 @@ def stable_up_to(material: Hyperelastic, largest_stretch: float) -> bool:
     tension of the other two directions, and the other way round.
     """
     return all(_first_loss(material, mode, largest_stretch) is None for mode in _PATHS)
+
+
+def digit_sensitivity(material: Hyperelastic, largest_stretch: float, digits: int = 4) -> float:
+    """Return how much the uniaxial stress changes if the constants are given with so many significant digits.
+
+    The largest sum over the constants of |∂P/∂c| times half a unit in c's last digit, for uniaxial stretches up to
+    `largest_stretch`, relative to the largest stress there. A set that loses its meaning by rounding is not a
+    measurement: near-equal Ogden exponents with huge opposite moduli, or high-order polynomials.
+    """
+    stretch = np.linspace(1.0, largest_stretch, 40)
+    exact = material.uniaxial(stretch)
+    values = np.array(list(material.parameters.values()))
+    change = np.zeros_like(stretch)
+    for i, value in enumerate(values):
+        if value == 0.0:
+            continue
+        moved = values.copy()
+        moved[i] += 0.5 * 10.0 ** (np.floor(np.log10(abs(value))) + 1 - digits)
+        change += np.abs(type(material).trial(moved.tolist()).uniaxial(stretch) - exact)
+    return float(change.max() / np.abs(exact).max())

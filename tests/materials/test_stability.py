@@ -1,0 +1,103 @@
+"""Drucker verdicts against closed forms and the thresholds known of published sets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from turgor.materials import create
+from turgor.materials.library import get
+from turgor.materials.registry import models
+from turgor.materials.stability import (
+    digit_sensitivity,
+    drucker_margin,
+    drucker_matrix,
+    principal_stretches,
+    stable_range,
+    stable_up_to,
+    verdict,
+)
+
+
+def test_matrix_is_abaqus_closed_form():
+    """D11 = 4(λ₁²+λ₃²)(U₁+λ₂²U₂) + 4(λ₁²−λ₃²)²(U₁₁+2λ₂²U₁₂+λ₂⁴U₂₂), Abaqus Theory Guide."""
+    material = create("mooney-rivlin-5", {"C10": 0.1, "C01": 0.02, "C20": 0.003, "C11": -0.001, "C02": 0.0005})
+    x = np.array([1.6, 0.8, 1 / (1.6 * 0.8)])
+    I1, I2 = np.array((x**2).sum()), np.array((x**-2.0).sum())
+    _, U1, U2, U11, U12, U22 = material.derivatives(I1, I2)
+    a, b, c = x**2
+    D11 = 4 * (a + c) * (U1 + b * U2) + 4 * (a - c) ** 2 * (U11 + 2 * b * U12 + b**2 * U22)
+    D22 = 4 * (b + c) * (U1 + a * U2) + 4 * (b - c) ** 2 * (U11 + 2 * a * U12 + a**2 * U22)
+    D12 = 4 * c * U1 + 4 / c * U2 + 4 * (b - c) * (a - c) * (U11 + (a + b) * U12 + a * b * U22)
+    np.testing.assert_allclose(drucker_matrix(material, x), [[D11, D12], [D12, D22]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", sorted(models()))
+def test_margin_of_the_undeformed_body_is_two(name):
+    model = models()[name]
+    values = {c.name: (0.1 if c.linear else c.starts[0]) for c in model.constants()}
+    assert float(drucker_margin(model.of(values), np.ones(3))) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "lost"),
+    [
+        ("tpu-0deg-mooney-rivlin-2", {}),
+        ("tpu-0deg-mooney-rivlin-3", {}),
+        ("dragon-skin-10-slow-neo-hookean", {}),
+        ("dragon-skin-10-slow-ogden-2", {}),
+        (
+            "tpu-0deg-mooney-rivlin-5",
+            {
+                "uniaxial": {"compression": 0.83},
+                "equibiaxial": {"tension": 1.10},
+                "planar": {"compression": 0.82, "tension": 1.22},
+            },
+        ),
+        (
+            "tpu-0deg-mooney-rivlin-9",
+            {
+                "uniaxial": {"compression": 0.94, "tension": 1.13},
+                "equibiaxial": {"compression": 0.94, "tension": 1.03},
+                "planar": {"compression": 0.94, "tension": 1.06},
+            },
+        ),
+    ],
+)
+def test_published_sets(name, lost):
+    found = verdict(get(name))
+    assert found.stable == (not lost)
+    assert found.lost.keys() == lost.keys()
+    for mode, places in lost.items():
+        assert found.lost[mode] == pytest.approx(places, abs=0.006)
+
+
+@pytest.mark.parametrize("name", ["dragon-skin-10-slow-mooney-rivlin", "tangoplus-mooney-rivlin"])
+def test_negative_c01_is_lost_in_biaxial_tension(name):
+    assert "tension" in verdict(get(name)).lost["equibiaxial"]
+
+
+def test_loss_is_where_the_margin_vanishes():
+    material = get("tpu-0deg-mooney-rivlin-5")
+    _, high = stable_range(material, "equibiaxial")
+    assert abs(float(drucker_margin(material, principal_stretches("equibiaxial", np.array(high))))) < 1e-9
+
+
+def test_tension_covers_compression():
+    """Uniaxial compression is equibiaxial tension: losses in one are found by tension in the other."""
+    material = get("tpu-0deg-mooney-rivlin-5")
+    low, _ = stable_range(material, "uniaxial")
+    _, high = stable_range(material, "equibiaxial")
+    assert low == pytest.approx(high**-2, rel=1e-6)
+    assert stable_up_to(material, 0.999 * high)
+    assert not stable_up_to(material, 1.001 * high)
+
+
+def test_cancelling_constants_are_sensitive_to_their_digits():
+    assert digit_sensitivity(get("tpu-0deg-mooney-rivlin-9"), 6.0, digits=5) > 1.0
+    assert digit_sensitivity(get("tpu-0deg-mooney-rivlin-2"), 6.0, digits=5) < 1e-4
+
+
+def test_verdict_says_it_in_words():
+    assert str(verdict(get("tpu-0deg-mooney-rivlin-2"))) == "stable in stretches 0.3–6"
+    assert "equibiaxial beyond 1.1" in str(verdict(get("tpu-0deg-mooney-rivlin-5")))
