@@ -100,11 +100,13 @@ def find_equilibrium(
     state = guess.with_(loads=system.loads_at(fraction))
     pending = system.constraints.imposed(state.u, fraction) - state.u
     moving = bool(np.any(pending))
+    # Where all forces are tiny, rounding is not to be mistaken for imbalance.
+    smallest = _rounding(system) / options.tolerance
     residuals: list[float] = []
     while True:
         force, scale = system.forces(state)
         residual = system.free_part(force)
-        relative = _relative(float(np.linalg.norm(residual)), scale, system)
+        relative = float(np.linalg.norm(residual)) / max(scale, smallest)
         residuals.append(relative)
         if on_iteration is not None:
             on_iteration(len(residuals) - 1, relative)
@@ -151,11 +153,10 @@ def _accepted(
     return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots)
 
 
-def _relative(norm: float, scale: float, system: System) -> float:
-    """Return the residual relative to the forces; forces of rounding errors only count as none."""
-    stiffest = max(solid.material.shear_modulus for solid in system.solids)
-    floor = 1e-12 * stiffest * float(np.ptp(system.mesh.points, axis=0).max()) ** 2
-    return norm / max(scale, floor)
+def _rounding(system: System) -> float:
+    """Return the size of the forces, N, that rounding alone causes: bulk modulus times area times a few units."""
+    squares = sum(float(np.sum(s.material.bulk_modulus**2 * s.volume ** (4 / 3))) for s in system.solids)
+    return 10.0 * np.finfo(float).eps * float(np.sqrt(squares))
 
 
 def _failure(reason: str, system: System, state: State, residuals: list[float]) -> NotConvergedError:

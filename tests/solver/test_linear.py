@@ -1,0 +1,52 @@
+"""The linear solvers agree with dense algebra and with each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from turgor.solver.linear import Pardiso, SingularMatrixError, SuperLU, make_linear_solver, solver_in_use
+
+
+def upper_pattern(matrix):
+    upper = sp.csr_matrix(np.triu(matrix) + 0.0)
+    upper.sort_indices()
+    return upper.indptr.astype(np.int32), upper.indices.astype(np.int32), upper.data
+
+
+@pytest.fixture
+def matrix():
+    rng = np.random.default_rng(0)
+    dense = rng.standard_normal((60, 60)) * (rng.random((60, 60)) < 0.1)
+    return dense + dense.T + np.diag(rng.uniform(5, 10, 60))
+
+
+KINDS = [SuperLU] + ([Pardiso] if solver_in_use() is Pardiso else [])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_solution(kind, matrix):
+    start, column, values = upper_pattern(matrix)
+    solver = kind(start, column)
+    right = np.arange(60.0)
+    for scale in (1.0, 3.0):  # the pattern is analysed once, the values change
+        solver.factorise(scale * values)
+        np.testing.assert_allclose(solver.solve(right), np.linalg.solve(scale * matrix, right), rtol=1e-9)
+
+
+def test_inertia(matrix):
+    shifted = matrix - 8.0 * np.eye(60)
+    expected = int((np.linalg.eigvalsh(shifted) < 0).sum())
+    assert 0 < expected < 60
+    start, column, values = upper_pattern(shifted)
+    solver = make_linear_solver(start, column)
+    solver.factorise(values)
+    assert solver.negative_pivots in (expected, None)
+    assert (solver.negative_pivots is None) == isinstance(solver, SuperLU)
+
+
+def test_singular_matrix_is_reported_by_superlu():
+    start, column, values = upper_pattern(np.array([[1.0, 1.0], [1.0, 1.0]]))
+    with pytest.raises(SingularMatrixError, match="singular"):
+        SuperLU(start, column).factorise(values)
