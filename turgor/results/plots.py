@@ -149,7 +149,7 @@ def stress_strain(fit: Mapping[str, Any]) -> go.Figure:
             )
         )
     for number, entry in enumerate(one for one in fit["fits"] if "curve" in one):
-        chosen = entry["model"] == fit.get("recommended")
+        chosen = entry["model"] == fit["recommended"]
         figure.add_trace(
             go.Scatter(
                 x=list(entry["curve"]["strain"]),

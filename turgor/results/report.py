@@ -210,7 +210,8 @@ def _fit_section(fit: Mapping[str, Any] | None) -> dict[str, Any] | None:
         return None
     return {
         "rows": fit["fits"],
-        "recommended": fit.get("recommended"),
+        "recommended": fit["recommended"],
+        "reason": fit.get("reason"),
         "figure": _as_json(plots.stress_strain(fit)),
     }
 

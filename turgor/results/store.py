@@ -29,7 +29,7 @@ from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.results import measures as known_measures
 from turgor.results.archive import Row, load_mesh, load_record, load_row, save_mesh, save_record, save_vtu
-from turgor.results.files import PARTIAL, FolderLock, replacing, write_text
+from turgor.results.files import PARTIAL, FolderLock, json_text, write_text
 from turgor.results.history import as_csv, row
 from turgor.results.record import StepRecord
 from turgor.results.summary import as_json
@@ -100,7 +100,7 @@ class RunStore:
         text = case if isinstance(case, str) else yaml.safe_dump(dict(case), sort_keys=False, allow_unicode=True)
         write_text(place / _CASE, text)
         save_mesh(place / _MESH, mesh)
-        write_text(place / _STORE, json.dumps({"layout": LAYOUT, "measures": chosen}) + "\n")
+        write_text(place / _STORE, json_text({"layout": LAYOUT, "measures": chosen}))
         store = cls(place, mesh, chosen, lock)
         store._write_tables()
         return store
@@ -177,7 +177,7 @@ class RunStore:
     def write_fit(self, fit: Mapping[str, Any]) -> None:
         """Write the fit of the material (what ``turgor fit --json`` prints, with its curves) for the report."""
         self._check_writable()
-        write_text(self.folder / _FIT, json.dumps(fit, indent=2, ensure_ascii=False) + "\n")
+        write_text(self.folder / _FIT, json_text(fit))
 
     @property
     def n_steps(self) -> int:
@@ -236,8 +236,7 @@ class RunStore:
             for index, entry in enumerate(self._rows)
         )
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-        with replacing(self.folder / _PVD) as partial:
-            partial.write_text(f"{head}{sets}  </Collection>\n</VTKFile>\n", encoding="utf-8")
+        write_text(self.folder / _PVD, f"{head}{sets}  </Collection>\n</VTKFile>\n")
 
 
 @contextmanager

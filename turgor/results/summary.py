@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import json
-import math
 import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.results.archive import Row
+from turgor.results.files import json_text
 from turgor.results.record import SOLVER_FACTS
 
 Summary = dict[str, Any]
@@ -103,12 +102,4 @@ def as_json(summary: Mapping[str, Any]) -> str:
         missing = [key] if key not in summary else [f"{key}.{name}" for name in inner if name not in summary[key]]
         if missing:
             raise InputError("the summary is incomplete", key=missing[0])
-    return json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json_text(summary)
