@@ -82,7 +82,7 @@ def solve_path(
     InputError
         If the fractions are not ascending numbers in (0, 1].
     StoppedShortError
-        If the walk ends before the last fraction; what was reached until then has been delivered.
+        If the walk ends before the last fraction; the last equilibrium that was found has been delivered too.
     """
     wanted = [float(f) for f in fractions]
     if not wanted or not all(0.0 < f <= 1.0 for f in wanted) or any(b <= a for a, b in itertools.pairwise(wanted)):
@@ -95,11 +95,18 @@ def solve_path(
         if on_equilibrium is not None:
             on_equilibrium(equilibrium)
 
-    if start is None and system.loaded_at_start:
-        deliver(walk.settle())
-    for fraction in wanted:
-        if fraction > walk.here.fraction:
-            deliver(walk.to(fraction))
+    try:
+        if start is None and system.loaded_at_start:
+            walk.settle()
+            deliver(walk.arrival())
+        for fraction in wanted:
+            if fraction > walk.here.fraction:
+                walk.to(fraction)
+                deliver(walk.arrival())
+    except StoppedShortError:
+        if walk.has_moved:
+            deliver(walk.arrival())
+        raise
     return reached
 
 
@@ -120,30 +127,44 @@ class _Walk:
         self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
         self.before: Equilibrium | None = None
         self.step = options.largest_step
+        self._residuals: list[float] = []
+        self._factorisations = 0
 
-    def settle(self) -> Equilibrium:
+    @property
+    def has_moved(self) -> bool:
+        """Whether equilibria were found since the last arrival."""
+        return bool(self._factorisations)
+
+    def arrival(self) -> Equilibrium:
+        """Return the equilibrium reached, with the work of all steps since the last arrival."""
+        last = self.here
+        residuals = (*self._residuals, last.residuals[-1])
+        whole = Equilibrium(last.state, last.fraction, residuals, self._factorisations, last.negative_pivots)
+        self._residuals, self._factorisations = [], 0
+        return whole
+
+    def settle(self) -> None:
         """Find the equilibrium at load fraction zero under what acts from the start."""
-        self.here = self._attempt(0.0, self.here.state)
-        return self.here
+        try:
+            self._arrive(self._attempt(0.0, self.here.state))
+        except NotConvergedError as error:
+            raise self._stopped(error) from error
 
-    def to(self, target: float) -> Equilibrium:
-        """Walk to the load fraction `target` and return its equilibrium, with the work of all steps on the way."""
-        iterations: list[float] = []
-        factorisations = 0
+    def to(self, target: float) -> None:
+        """Walk to the load fraction `target`."""
         while self.here.fraction < target:
             aim = min(target, self.here.fraction + self.step)
             if target - aim < 0.2 * self.step:
                 aim = target
             found = self._try(aim)
-            if found is None:
-                continue
-            iterations += found.residuals[:-1]
-            factorisations += found.factorisations
-            self.before, self.here = self.here, found
-        last = self.here
-        return Equilibrium(
-            last.state, last.fraction, (*iterations, last.residuals[-1]), factorisations, last.negative_pivots
-        )
+            if found is not None:
+                self.before = self.here
+                self._arrive(found)
+
+    def _arrive(self, found: Equilibrium) -> None:
+        self.here = found
+        self._residuals += found.residuals[:-1]
+        self._factorisations += found.factorisations
 
     def _try(self, aim: float) -> Equilibrium | None:
         """Attempt one step; shorten the next and return ``None`` if it fails."""
@@ -185,22 +206,23 @@ class _Walk:
 
     def _shorten(self, size: float, error: NotConvergedError) -> None:
         self.step = CUT * size
-        if self.step >= self.options.smallest_step:
-            return
+        if self.step < self.options.smallest_step:
+            raise self._stopped(error) from error
+
+    def _stopped(self, error: NotConvergedError) -> StoppedShortError:
         here = self.here
         facts: dict[str, object] = {"last_fraction": here.fraction, "last_stable": here.stable}
         for load, name, value in zip(self.system.loads, self.system.load_names, here.state.loads, strict=True):
-            facts[f"{name}_kPa" if isinstance(load, Pressure) else name] = float(value) * (
-                1e3 if isinstance(load, Pressure) else 1.0
-            )
-        raise StoppedShortError(
+            pressure = isinstance(load, Pressure)
+            facts[f"{name}_kPa" if pressure else name] = float(value) * (1e3 if pressure else 1.0)
+        return StoppedShortError(
             f"no equilibrium was found beyond {_load_text(facts)} ({error.reason})",
             advice=(
                 "The actuator may have a limit pressure there, the material may lose its stability, or the mesh may be "
                 "too coarse where it is most distorted"
             ),
             facts=facts | error.facts,
-        ) from error
+        )
 
 
 def _load_text(facts: dict[str, object]) -> str:
