@@ -1,0 +1,177 @@
+"""Every malformed file in ``bad/`` ends in exit code 2 and one message that names the file, the key and the cure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from turgor.cli import app
+
+BAD = Path(__file__).parent / "bad"
+
+CASES: dict[str, tuple[str, ...]] = {
+    "a-list.yaml": ("no keys",),
+    "bare-constant.yaml": ("materials.body.constants.C10", "a unit is missing", "0.05"),
+    "bare-number.yaml": ("mesh.size", "a unit is missing", "found 6", "'3 mm'"),
+    "billion-laughs.yaml": ("line 2", "alias"),
+    "binary.yaml": ("UTF-8",),
+    "boolean-for-a-number.yaml": ("solver.steps", "True", "whole number"),
+    "caps-meet.yaml": ("geometry.cap", "no cavity is left", "less than half of the length"),
+    "circular.yaml": ("line 3", "alias"),
+    "constant-of-wrong-unit.yaml": ("materials.body.constants.C10", "'mm' is not a unit of pressure"),
+    "control-character.yaml": ("not YAML", "x0007"),
+    "csv-without-stress.yaml": ("no-stress.csv", "Force (N)", "cross-section"),
+    "deeper-than-vacuum.yaml": ("loads.0.value", "vacuum", "-0.101325 MPa"),
+    "deeply-nested.yaml": ("nested too deeply",),
+    "direction-of-two-numbers.yaml": ("loads.1.direction.2", "missing"),
+    "direction-without-length.yaml": ("loads.1.direction", "length 0"),
+    "displacement-nowhere.yaml": ("supports.0", "at least one of x, y and z"),
+    "duplicate-inner-key.yaml": ("line 3", "'C10' is given twice"),
+    "duplicate-key.yaml": ("line 10", "'mesh' is given twice"),
+    "empty-loads.yaml": ("loads", "empty"),
+    "empty.yaml": ("the file is empty",),
+    "expression.yaml": ("loads.0.value", "2 * 3 kPa"),
+    "fit-of-unknown-model.yaml": ("materials.body.models.0", "yeah-3", "yeoh-3"),
+    "gravity-without-density.yaml": ("materials.body.density", "1070 kg/m^3"),
+    "harder-than-diamond.yaml": ("materials.body", "diamond"),
+    "infinite.yaml": ("materials.body.constants.C10", "not finite"),
+    "latin-1.yaml": ("byte 181", "UTF-8"),
+    "list-as-key.yaml": ("line 4", "cannot be a key"),
+    "list-for-a-mapping.yaml": ("mesh", "['6 mm']", "'key: value'"),
+    "mapping-for-a-list.yaml": ("supports", "a list"),
+    "merge-key.yaml": ("mesh.<<", "unknown key"),
+    "missing-constant.yaml": ("materials.body.constants.C10", "missing"),
+    "name-with-a-path.yaml": ("name", "../elsewhere"),
+    "nan-number.yaml": ("materials.body.poisson", "finite"),
+    "nan.yaml": ("loads.0.value", "not finite"),
+    "negative-D1.yaml": ("materials.body.D1", "greater than 0"),
+    "negative-modulus.yaml": ("materials.body", "shear modulus of -0.2 MPa", "positive"),
+    "negative-thickness.yaml": ("geometry.wall", "greater than 0 mm", "-3 mm"),
+    "no-load-type.yaml": ("loads.0.type", "missing"),
+    "no-loads.yaml": ("loads", "missing"),
+    "no-material.yaml": ("materials.body", "library, model and fit"),
+    "no-steps.yaml": ("solver.steps", "greater than or equal to 1"),
+    "no-supports.yaml": ("supports", "missing"),
+    "no-template.yaml": ("geometry.template", "missing", "tube"),
+    "not-a-quantity.yaml": ("loads.0.value", "five kPa", "'12 psi'"),
+    "not-held.yaml": ("supports", "free to shift along x"),
+    "not-yaml.yaml": ("line 5", "not YAML"),
+    "only-comments.yaml": ("the file is empty",),
+    "only-text.yaml": ("no keys", "a tube of rubber"),
+    "outputs-beyond-the-load.yaml": ("solver.outputs", "from 0 to the load's"),
+    "outputs-out-of-order.yaml": ("solver.outputs", "in order"),
+    "poisson-0.6.yaml": ("materials.body.poisson", "0.6", "below 0.5"),
+    "pressure-of-1e9.yaml": ("loads.0.value", "times the shear modulus", "check both units"),
+    "python-tag.yaml": ("line 4", "python/object/apply:os.system", "not allowed"),
+    "steps-and-outputs.yaml": ("solver", "only one of the two"),
+    "strain-range-of-one.yaml": ("materials.body.strain_range", "0:3"),
+    "strain-range-reversed.yaml": ("materials.body.strain_range", "1:0.5", "empty"),
+    "tab-indented.yaml": ("line 6", "not YAML"),
+    "text-for-a-list.yaml": ("measures", "a list"),
+    "text-for-a-number.yaml": ("solver.steps", "'one'", "whole number"),
+    "text-tag.yaml": ("line 4", "tag"),
+    "too-fine.yaml": ("mesh.size", "more than 20 elements", "0.15 mm"),
+    "two-bulk-moduli.yaml": ("materials.body.poisson", "given twice", "bulk_modulus"),
+    "two-documents.yaml": ("line 4", "another document"),
+    "two-pressures.yaml": ("loads", "two pressures"),
+    "unknown-cavity.yaml": ("loads.0.cavity", "'outer'", "cavity"),
+    "unknown-constant.yaml": ("materials.body.constants.D10", "C10 [MPa]"),
+    "unknown-csv.yaml": ("materials.body.fit", "nowhere.csv", "relative to the case file"),
+    "unknown-key.yaml": ("mesh.sise", "unknown key", "'size'"),
+    "unknown-material.yaml": ("materials.body.library", "unobtainium", "turgor materials"),
+    "unknown-measure.yaml": ("measures", "'bending'", "bending_angle"),
+    "unknown-model.yaml": ("materials.body.model", "neo-hokean", "neo-hookean"),
+    "unknown-parameter.yaml": ("geometry.wal", "wall"),
+    "unknown-region.yaml": ("materials.base", "region", "body"),
+    "unknown-support.yaml": ("supports.0.type", "glued", "clamped"),
+    "unknown-surface.yaml": ("supports.0.surface", "mounting", "'mount'"),
+    "unknown-template.yaml": ("geometry.template", "tubes", "'tube'"),
+    "unknown-top-key.yaml": ("suports", "unknown key", "'supports'"),
+    "unknown-unit.yaml": ("loads.0.value", "5 kPaa", "known unit"),
+    "utf-16.yaml": ("UTF-8",),
+    "walls-meet.yaml": ("geometry.tunnel_roof", "walls meet", "less than"),
+    "wrong-unit.yaml": ("mesh.size", "'kPa' is not a unit of length"),
+    "zero-size.yaml": ("mesh.size", "greater than 0 mm"),
+}
+"""Case file → words that its message must hold besides the name of the file."""
+
+TESTS: dict[str, tuple[str, ...]] = {
+    "all-nan.csv": ("usable points",),
+    "binary.csv": ("not a text file",),
+    "compressed-away.csv": ("row", "-100 %", "impossible"),
+    "empty.csv": ("empty",),
+    "header-only.csv": ("no rows",),
+    "no-header.csv": ("header",),
+    "no-stress.csv": ("Force (N)", "cross-section"),
+    "one-point.csv": ("usable points",),
+    "spreadsheet.csv": ("not a text file",),
+    "text-in-columns.csv": ("row 2", "Engineering Strain", "not a number", "small"),
+    "unknown-unit.csv": ("Engineering Stress (furlong)", "unit"),
+}
+"""Tensile test → words that the message of ``turgor fit`` must hold."""
+
+NOT_BAD = {"good.csv"}
+
+
+def the_message(arguments: list[str]) -> str:
+    """Run a command that must refuse its input and return the one message it gives."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+    messages = [line for line in result.stderr.splitlines() if line.startswith("turgor:")]
+    assert len(messages) == 1, result.stderr
+    assert result.stderr.rstrip().endswith(messages[0])
+    return messages[0]
+
+
+def test_every_bad_file_is_listed() -> None:
+    assert {path.name for path in BAD.iterdir()} == CASES.keys() | TESTS.keys() | NOT_BAD
+    assert len(CASES) + len(TESTS) >= 40
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_malformed_case_is_refused(name: str, tmp_path: Path) -> None:
+    message = the_message(["run", str(BAD / name), "--out", str(tmp_path / "out")])
+    assert name in message or "no-stress.csv" in message
+    for words in CASES[name]:
+        assert words in message
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", TESTS)
+def test_a_malformed_test_is_refused(name: str) -> None:
+    message = the_message(["fit", str(BAD / name), "--model", "yeoh-1"])
+    for words in (name, *TESTS[name]):
+        assert words in message
+
+
+def test_a_folder_is_not_a_case(tmp_path: Path) -> None:
+    message = the_message(["run", str(tmp_path)])
+    assert str(tmp_path) in message
+    assert "not a file" in message
+
+
+def test_a_case_may_be_missing(tmp_path: Path) -> None:
+    assert "no such file" in the_message(["run", str(tmp_path / "tube.yaml")])
+
+
+def test_a_case_may_be_too_long(tmp_path: Path) -> None:
+    case = tmp_path / "long.yaml"
+    case.write_text("# long\n" * 200_000, encoding="utf-8")
+    assert "too long" in the_message(["run", str(case)])
+
+
+def test_a_bad_change_names_the_option() -> None:
+    case = str(BAD.parents[2] / "examples" / "tube.yaml")
+    assert "--set: mesh.sise: unknown key" in the_message(["run", case, "--set", "mesh.sise=3 mm"])
+    assert "--set: loads.3.value: there is no such item" in the_message(["run", case, "--set", "loads.3.value=1 kPa"])
+    assert "--set: this is not an assignment" in the_message(["run", case, "--set", "mesh.size"])
+    assert "--set: name.x: 'name' holds no keys" in the_message(["run", case, "--set", "name.x=1"])
+
+
+def test_no_python_of_a_case_is_run() -> None:
+    the_message(["run", str(BAD / "python-tag.yaml")])
+    assert not Path("pwned").exists()

@@ -1,0 +1,99 @@
+"""Turgor: from a tensile test and a shape to the motion of a soft pneumatic actuator.
+
+The names below are the public ones. Each is loaded when first used, so that ``import turgor`` is quick, loads
+no heavy package and acts on nothing.
+
+>>> import turgor as tg
+>>> tg.CappedTube(length="90 mm").length
+90.0
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from turgor.common.errors import InputError, MissingPackageError, SolverError, TurgorError
+    from turgor.geometry.catalogue import template, templates
+    from turgor.materials.fit import fit
+    from turgor.materials.library import find as find_material
+    from turgor.materials.library import library
+    from turgor.materials.registry import create as material
+    from turgor.materials.registry import models
+    from turgor.mesh.files import write as write_mesh
+    from turgor.mesh.mesh import Mesh
+    from turgor.mesh.quality import quality as mesh_quality
+    from turgor.study.api import CappedTube, Model, PneuNet
+    from turgor.study.case import Case, load_case
+    from turgor.study.environment import environment
+    from turgor.study.fitting import fit_document, write_fit_report, write_material
+    from turgor.study.path import Path
+    from turgor.study.run import Run, mesh_case, run
+
+__all__ = [
+    "CappedTube",
+    "Case",
+    "InputError",
+    "Mesh",
+    "MissingPackageError",
+    "Model",
+    "Path",
+    "PneuNet",
+    "Run",
+    "SolverError",
+    "TurgorError",
+    "environment",
+    "find_material",
+    "fit",
+    "fit_document",
+    "library",
+    "load_case",
+    "material",
+    "mesh_case",
+    "mesh_quality",
+    "models",
+    "run",
+    "template",
+    "templates",
+    "write_fit_report",
+    "write_material",
+    "write_mesh",
+]
+
+_HOMES = {
+    "turgor.common.errors": ("InputError", "MissingPackageError", "SolverError", "TurgorError"),
+    "turgor.geometry.catalogue": ("template", "templates"),
+    "turgor.materials.fit": ("fit",),
+    "turgor.materials.library": ("find_material", "library"),
+    "turgor.materials.registry": ("material", "models"),
+    "turgor.mesh.files": ("write_mesh",),
+    "turgor.mesh.mesh": ("Mesh",),
+    "turgor.mesh.quality": ("mesh_quality",),
+    "turgor.study.api": ("CappedTube", "Model", "PneuNet"),
+    "turgor.study.case": ("Case", "load_case"),
+    "turgor.study.environment": ("environment",),
+    "turgor.study.fitting": ("fit_document", "write_fit_report", "write_material"),
+    "turgor.study.path": ("Path",),
+    "turgor.study.run": ("Run", "mesh_case", "run"),
+}
+"""Module → the public names that it defines."""
+
+_RENAMED = {"find_material": "find", "material": "create", "mesh_quality": "quality", "write_mesh": "write"}
+"""Public name → its name at home, where the two differ."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return importlib.metadata.version("turgor")
+    home = next((module for module, names in _HOMES.items() if name in names), None)
+    if home is None:
+        raise AttributeError(f"module 'turgor' has no attribute '{name}'")
+    value = getattr(importlib.import_module(home), _RENAMED.get(name, name))
+    globals()[name] = value  # the next access does not come here
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

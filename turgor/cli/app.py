@@ -1,0 +1,169 @@
+"""The commands and their options; what they do lies in the rooms below."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+import turgor as tg
+from turgor.cli import tables
+from turgor.cli.failure import Commands, naming, tell
+from turgor.cli.output import print_json, print_table, print_text
+from turgor.cli.progress import progress_on
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+CaseFile = Annotated[Path, typer.Argument(metavar="CASE.yaml", help="The case file.", show_default=False)]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the case, as in --set mesh.size='3 mm'."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else there.")]
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        print_text(f"turgor {tg.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def turgor(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Soft pneumatic actuators, from a tensile test and a shape to their motion."""
+
+
+@app.command()
+def run(
+    case_file: CaseFile,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the run; the case's name if left out.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut short.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the run that is in the folder.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run a case: find the rubber, mesh the shape, load it, measure, report."""
+    with naming(case_file):
+        case = tg.load_case(case_file, changes or ())
+        folder = out or Path(case.name)
+        with progress_on(Console(stderr=True)) as progress:
+            done = tg.run(case, folder, resume=resume, overwrite=overwrite, progress=progress)
+    if as_json:
+        print_json(done.summary)
+    else:
+        print_table(tables.final(done.summary, done.folder))
+    if not done.converged:
+        tell(f"stopped short of the full load: {done.reason}")
+        raise typer.Exit(tg.SolverError.exit_code)
+
+
+@app.command()
+def fit(
+    data: Annotated[list[Path], typer.Argument(metavar="DATA.csv…", help="Tests to fit together.")],
+    models: Annotated[
+        list[str] | None, typer.Option("--model", metavar="NAME", help="Model to fit; all of them if left out.")
+    ] = None,
+    strain_range: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Strains between which the tests count, as in 0:3 or 0:300%.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.yaml", help="Write the recommended material for a case file.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(metavar="DIR", help="Write fit.html and fit.json there.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fit material models to tensile and other tests."""
+    fitted = tg.fit(data, models or "all", strain_range=strain_range)
+    if out:
+        tg.write_material(fitted, out)
+    if report:
+        tg.write_fit_report(fitted, report)
+    if as_json:
+        print_json(fitted.as_dict())
+    else:
+        print_table(tables.fits(fitted))
+
+
+@app.command()
+def materials(
+    name: Annotated[str | None, typer.Argument(help="One set of constants, in full.", show_default=False)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the published materials, or show one."""
+    entries = [tg.find_material(name)] if name else tg.library()
+    if as_json:
+        print_json(entries[0].as_dict() if name else [entry.as_dict() for entry in entries])
+    elif name:
+        print_table(tables.pairs(name, entries[0].as_dict()))
+    else:
+        print_table(tables.library(entries))
+
+
+@app.command()
+def templates(
+    name: Annotated[str | None, typer.Argument(help="One template, with its parameters.", show_default=False)] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the actuator templates, or show the parameters of one."""
+    known = [tg.template(name)] if name else list(tg.templates().values())
+    if as_json:
+        described = [tables.template_document(template) for template in known]
+        print_json(described[0] if name else described)
+    else:
+        print_table(tables.parameters(known[0]) if name else tables.templates(known))
+
+
+@app.command()
+def mesh(
+    case_file: CaseFile,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Mesh file, .msh or .vtu; the case's name with .vtu if left out."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Mesh the actuator of a case, write the mesh and say how good it is."""
+    with naming(case_file):
+        case = tg.load_case(case_file, changes or ())
+        meshed = tg.mesh_case(case)
+    path = out or Path(f"{case.name}.vtu")
+    tg.write_mesh(meshed, path)
+    facts = tables.mesh_document(meshed, tg.mesh_quality(meshed).summary(), path)
+    if as_json:
+        print_json(facts)
+    else:
+        print_table(tables.pairs(case.name, facts))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files, by which an editor completes their keys."""
+    print_json(tg.Case.model_json_schema())
+
+
+@app.command()
+def doctor(as_json: AsJson = False) -> None:
+    """Say what Turgor stands on here: versions, threads, linear solver, and what is missing."""
+    found = tg.environment()
+    if as_json:
+        print_json(found)
+    else:
+        print_table(tables.environment(found))
+    for sentence in found["missing"]:
+        tell(sentence)

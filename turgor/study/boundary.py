@@ -1,0 +1,163 @@
+"""Supports and loads as a case file names them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+
+from turgor.common.units import Acceleration, Force, Foundation, Length, Pressure
+from turgor.fem.loads import Force as SurfaceForce
+from turgor.fem.loads import Gravity, Traction
+from turgor.fem.loads import Pressure as CavityPressure
+from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
+from turgor.study.validation import StrictModel, explain, invalid, under
+
+Vector = tuple[float, float, float]
+
+
+def _not_zero(vector: Vector) -> Vector:
+    if not math.hypot(*vector) > 0.0:
+        raise invalid("this direction has length 0", value=vector, expected="three numbers that are not all 0")
+    return vector
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+"""Three numbers without unit; only their direction counts."""
+
+
+class ClampedCase(StrictModel):
+    """A surface that does not move."""
+
+    type: Literal["clamped"]
+    surface: str
+
+    def build(self) -> Clamped:
+        """Return the support."""
+        return Clamped(self.surface)
+
+
+class SlidingCase(StrictModel):
+    """A flat surface that keeps its plane without friction."""
+
+    type: Literal["sliding"]
+    surface: str
+
+    def build(self) -> Sliding:
+        """Return the support."""
+        return Sliding(self.surface)
+
+
+class DisplacementCase(StrictModel):
+    """A surface moved by a given amount along the axes that are named; free along the others."""
+
+    type: Literal["displacement"]
+    surface: str
+    x: Length | None = None
+    y: Length | None = None
+    z: Length | None = None
+
+    @model_validator(mode="after")
+    def _moves_somewhere(self) -> Self:
+        if self.x is None and self.y is None and self.z is None:
+            raise invalid("the surface is not moved along any axis", expected="at least one of x, y and z")
+        return self
+
+    def build(self) -> Prescribed:
+        """Return the support."""
+        return Prescribed(self.surface, displacement=(self.x, self.y, self.z))
+
+
+class ElasticCase(StrictModel):
+    """A surface held by springs, in every direction or along its normal only."""
+
+    type: Literal["elastic"]
+    surface: str
+    stiffness: Foundation = Field(description="force per volume swept: pressure per displacement")
+    normal_only: bool = False
+
+    def build(self) -> ElasticSupport:
+        """Return the support."""
+        return ElasticSupport(self.surface, stiffness=self.stiffness, normal_only=self.normal_only)
+
+
+class PressureCase(StrictModel):
+    """Air pressure above the atmosphere's in a closed cavity."""
+
+    type: Literal["pressure"]
+    cavity: str = "cavity"
+    value: Pressure
+
+    def build(self) -> CavityPressure:
+        """Return the load."""
+        return CavityPressure(self.cavity, self.value)
+
+
+class GravityCase(StrictModel):
+    """Weight of every region that has a density."""
+
+    type: Literal["gravity"]
+    acceleration: Acceleration = 9806.65
+    direction: Direction = (0.0, 0.0, -1.0)
+
+    def build(self) -> Gravity:
+        """Return the load."""
+        return Gravity(_along(self.direction, self.acceleration))
+
+
+class TractionCase(StrictModel):
+    """A dead load per reference area on a surface."""
+
+    type: Literal["traction"]
+    surface: str
+    value: Pressure
+    direction: Direction
+
+    def build(self) -> Traction:
+        """Return the load."""
+        return Traction(self.surface, _along(self.direction, self.value))
+
+
+class ForceCase(StrictModel):
+    """A dead force in all, spread evenly over a surface."""
+
+    type: Literal["force"]
+    surface: str
+    value: Force
+    direction: Direction
+
+    def build(self) -> SurfaceForce:
+        """Return the load."""
+        return SurfaceForce(self.surface, _along(self.direction, self.value))
+
+
+Support = Annotated[ClampedCase | SlidingCase | DisplacementCase | ElasticCase, Field(discriminator="type")]
+Load = Annotated[PressureCase | GravityCase | TractionCase | ForceCase, Field(discriminator="type")]
+
+_SUPPORTS: TypeAdapter[tuple[Support, ...]] = TypeAdapter(tuple[Support, ...])
+_LOADS: TypeAdapter[tuple[Load, ...]] = TypeAdapter(tuple[Load, ...])
+
+
+def read_supports(items: Sequence[Mapping[str, Any]]) -> tuple[Support, ...]:
+    """Return supports given as in a case file; raise InputError as a case file does."""
+    data = [dict(item) for item in items]
+    try:
+        return _SUPPORTS.validate_python(data)
+    except ValidationError as error:
+        raise under(explain(error, data), "supports") from None
+
+
+def read_loads(items: Sequence[Mapping[str, Any]]) -> tuple[Load, ...]:
+    """Return loads given as in a case file; raise InputError as a case file does."""
+    data = [dict(item) for item in items]
+    try:
+        return _LOADS.validate_python(data)
+    except ValidationError as error:
+        raise under(explain(error, data), "loads") from None
+
+
+def _along(direction: Vector, size: float) -> Vector:
+    scale = size / math.hypot(*direction)
+    return (direction[0] * scale, direction[1] * scale, direction[2] * scale)

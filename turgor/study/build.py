@@ -1,0 +1,130 @@
+"""From a case to the system that the solver takes, with every name and size checked on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+
+from turgor.common.errors import InputError
+from turgor.common.units import to_text
+from turgor.fem.system import System
+from turgor.materials import Hyperelastic
+from turgor.mesh import Mesh
+from turgor.study.boundary import GravityCase, PressureCase, TractionCase
+from turgor.study.case import Case
+from turgor.study.validation import suggestion
+
+ATMOSPHERE = 0.101325
+"""MPa; a pressure below its negative is no vacuum but an impossibility."""
+
+STIFFEST_SOLID = 5.5e5
+"""Shear modulus of diamond, rounded up, MPa."""
+
+MOST_PRESSURE_PER_MODULUS = 100.0
+"""Pressure over shear modulus beyond which no actuator of any shape is an equilibrium worth asking for."""
+
+MOST_ELEMENTS_PER_WALL = 20
+"""Beyond it the mesh is not a fine one but a slip of the unit, and would fill the memory of any machine."""
+
+
+def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
+    """Refuse a load or a stiffness that no actuator can have, before anything expensive is done.
+
+    Raises
+    ------
+    InputError
+        Saying which value, against what it was held, and what is possible.
+    """
+    for region, material in materials.items():
+        if material.shear_modulus > STIFFEST_SOLID:
+            raise InputError(
+                f"a shear modulus of {material.shear_modulus:.3g} MPa is more than diamond's",
+                key=f"materials.{region}",
+                expected="constants in the unit that they are printed with",
+            )
+        if material.density is None and any(isinstance(load, GravityCase) for load in case.loads):
+            raise InputError(
+                "gravity needs the density of every material",
+                key=f"materials.{region}.density",
+                expected="a density with its unit, such as '1070 kg/m^3'",
+            )
+    coarsest = case.geometry.default_size
+    if case.mesh.size is not None and case.mesh.size < coarsest / MOST_ELEMENTS_PER_WALL:
+        raise InputError(
+            f"this is more than {MOST_ELEMENTS_PER_WALL} elements through the thinnest wall",
+            key="mesh.size",
+            value=to_text(case.mesh.size, "length"),
+            expected=f"about {coarsest:g} mm, and not below {coarsest / MOST_ELEMENTS_PER_WALL:g} mm",
+        )
+    stiffest = max(material.shear_modulus for material in materials.values())
+    for number, load in enumerate(case.loads):
+        key = f"loads.{number}.value"
+        if isinstance(load, PressureCase) and load.value < -ATMOSPHERE:
+            raise InputError(
+                "a vacuum cannot be deeper than the pressure of the atmosphere",
+                key=key,
+                value=to_text(load.value, "pressure"),
+                expected=f"at least {-ATMOSPHERE} MPa",
+            )
+        if isinstance(load, (PressureCase, TractionCase)) and abs(load.value) > MOST_PRESSURE_PER_MODULUS * stiffest:
+            raise InputError(
+                f"this is {abs(load.value) / stiffest:.3g} times the shear modulus of the stiffest material "
+                f"({stiffest:.3g} MPa), and no actuator of it can hold that",
+                key=key,
+                value=to_text(load.value, "pressure"),
+                expected=f"at most {MOST_PRESSURE_PER_MODULUS:g} times the modulus; check both units",
+            )
+
+
+def every_region(materials: Mapping[str, Hyperelastic], mesh: Mesh) -> dict[str, Hyperelastic]:
+    """Return a material for each region of the mesh: its own, or that of ``body`` where it has none.
+
+    Raises
+    ------
+    InputError
+        If a material is given for a region that the mesh does not have, or a region has none and neither has ``body``.
+    """
+    _check_regions(materials, mesh)
+    return {region: materials.get(region) or materials["body"] for region in mesh.regions}
+
+
+def check_names(case: Case, mesh: Mesh) -> None:
+    """Refuse a region, surface or cavity that the mesh does not have.
+
+    Raises
+    ------
+    InputError
+        With the key and the names that there are.
+    """
+    _check_regions(case.materials, mesh)
+    for number, support in enumerate(case.supports):
+        _check_name(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
+    cavities = [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
+    for number, load in enumerate(case.loads):
+        if isinstance(load, PressureCase):
+            _check_name(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
+        elif not isinstance(load, GravityCase):
+            _check_name(load.surface, mesh.surfaces, f"loads.{number}.surface", "surface")
+
+
+def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> System:
+    """Return the system of a case on its mesh; raise InputError as `every_region`, `check_names` or System do."""
+    check_names(case, mesh)
+    return System(
+        mesh,
+        every_region(materials, mesh),
+        supports=[support.build() for support in case.supports],
+        loads=[load.build() for load in case.loads],
+    )
+
+
+def _check_regions(names: Collection[str], mesh: Mesh) -> None:
+    for name in names:
+        _check_name(name, mesh.regions, f"materials.{name}", "region")
+    for region in mesh.regions:
+        if region not in names and "body" not in names:
+            raise InputError(f"no material is given for the region '{region}'", key=f"materials.{region}")
+
+
+def _check_name(name: str, known: Iterable[str], key: str, kind: str) -> None:
+    if name not in known:
+        raise InputError(f"the actuator has no such {kind}", key=key, value=name, expected=suggestion(name, known))

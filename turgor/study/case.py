@@ -1,0 +1,225 @@
+"""The case file: one study of one actuator, checked and with its units resolved.
+
+A case is read from YAML, changed by ``--set`` assignments, validated in one place, and written back as the
+resolved ``case.yaml`` of a run's folder, which gives the same run again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import yaml
+from pydantic import (
+    BeforeValidator,
+    Field,
+    GetJsonSchemaHandler,
+    PlainSerializer,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from turgor.common.errors import InputError
+from turgor.common.units import PositiveLength, Pressure
+from turgor.geometry.actuator import Actuator
+from turgor.geometry.catalogue import templates
+from turgor.results.measures import MEASURES
+from turgor.solver.newton import NewtonOptions
+from turgor.solver.path import PathOptions, output_fractions
+from turgor.study.boundary import Load, PressureCase, Support
+from turgor.study.materials import FittedMaterial, MaterialChoice
+from turgor.study.reading import override, read_mapping
+from turgor.study.validation import StrictModel, explain, invalid, suggestion, under
+
+
+def _actuator(value: object) -> object:
+    """Read ``{template: name, …its parameters}``; a template that is already built passes."""
+    if not isinstance(value, dict):
+        return value
+    parameters = dict(value)
+    name = parameters.pop("template", None)
+    known = templates()
+    if not isinstance(name, str) or name not in known:
+        problem = "this key is missing" if name is None else "unknown template"
+        raise InputError(problem, key="geometry.template", value=name, expected=suggestion(str(name), known))
+    try:
+        return known[name](**parameters)
+    except InputError as error:
+        raise under(error, "geometry") from error
+
+
+def _template_and_parameters(actuator: Actuator) -> dict[str, Any]:
+    return {"template": actuator.template, **actuator.model_dump(mode="json")}
+
+
+class _GeometrySchema:
+    """JSON Schema of the geometry: one alternative a template, so that an editor completes its parameters."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        alternatives = []
+        for name, template in templates().items():
+            schema = template.model_json_schema()
+            schema["properties"] = {"template": {"const": name}, **schema["properties"]}
+            schema["required"] = ["template", *schema.get("required", [])]
+            alternatives.append(schema)
+        return {"oneOf": alternatives}
+
+
+Geometry = Annotated[Actuator, BeforeValidator(_actuator), PlainSerializer(_template_and_parameters), _GeometrySchema]
+
+
+class MeshCase(StrictModel):
+    """How finely the actuator is cut into tetrahedra."""
+
+    size: PositiveLength | None = Field(default=None, description="edge length; left out, the template's own default")
+
+
+Count = Annotated[int, Field(strict=True, ge=1)]
+Part = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
+
+
+class SolverCase(StrictModel):
+    """Where on the way to the full load a state is kept, and how accurate it is."""
+
+    steps: Count | None = Field(default=None, le=10_000, description="states at equal steps of the load")
+    outputs: tuple[Pressure, ...] | None = Field(default=None, min_length=1, description="or states at these pressures")
+    tolerance: Part = Field(default=1e-7, le=1e-3, description="residual relative to the largest of the forces in it")
+    max_iterations: Count = Field(default=25, le=1000, description="linear solves allowed for one state")
+    largest_step: Part = Field(default=1.0, description="longest step, as part of the load")
+    smallest_step: Part = Field(default=1e-3, description="shortest step tried before giving up")
+
+    def options(self) -> PathOptions:
+        """Return the options of the load path."""
+        newton = NewtonOptions(tolerance=self.tolerance, max_iterations=self.max_iterations)
+        return PathOptions(newton, largest_step=self.largest_step, smallest_step=self.smallest_step)
+
+    @model_validator(mode="after")
+    def _steps_or_outputs(self) -> Self:
+        if self.steps is not None and self.outputs is not None:
+            raise invalid("both steps and outputs are given", expected="only one of the two")
+        return self
+
+
+class Case(StrictModel):
+    """One study of one actuator: what it is made of, how it is held and loaded, and what is to be known of it.
+
+    Made from a file by :func:`load_case`. Quantities are kept in internal units and written back with them.
+    """
+
+    name: str = Field(description="the run's name, and its folder where none is given")
+    geometry: Geometry
+    materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
+    mesh: MeshCase = MeshCase()
+    supports: tuple[Support, ...] = Field(min_length=1)
+    loads: tuple[Load, ...] = Field(min_length=1)
+    solver: SolverCase = SolverCase()
+    measures: tuple[str, ...] | None = Field(default=None, description="left out, all that the actuator's names allow")
+
+    @field_validator("name")
+    @classmethod
+    def _name_suits_a_folder(cls, name: str) -> str:
+        if not _NAME.fullmatch(name):
+            raise invalid("this cannot be a name", value=name, expected="letters, digits, '-', '_' and '.'")
+        return name
+
+    @field_validator("measures")
+    @classmethod
+    def _measures_exist(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        for name in names or ():
+            if name not in MEASURES:
+                raise invalid("unknown measure", value=name, expected=suggestion(name, MEASURES))
+        return names
+
+    @model_validator(mode="after")
+    def _cavities_and_outputs_agree(self) -> Self:
+        cavities = [load.cavity for load in self.pressures]
+        if len(set(cavities)) < len(cavities):
+            raise invalid("a cavity is given two pressures", key="loads", expected="one pressure for each cavity")
+        self.fractions()
+        return self
+
+    @property
+    def pressures(self) -> tuple[PressureCase, ...]:
+        """The loads that are pressures of a cavity."""
+        return tuple(load for load in self.loads if isinstance(load, PressureCase))
+
+    @property
+    def full_pressure(self) -> float:
+        """The pressure of largest size at the full load, MPa; 0 without any."""
+        return max((load.value for load in self.pressures), key=abs, default=0.0)
+
+    def fractions(self) -> tuple[float, ...]:
+        """Return the fractions of the load, in (0, 1] and ascending, at which states are asked for."""
+        if self.solver.outputs is None:
+            return tuple(output_fractions(self.solver.steps or DEFAULT_STEPS))
+        target = self.full_pressure
+        key, expected = (
+            "solver.outputs",
+            "pressures in order from 0 to the load's, the last equal to it",
+        )
+        if target == 0.0:
+            raise invalid("the outputs are pressures, and no load is one", key=key, expected="solver.steps instead")
+        fractions = tuple(pressure / target for pressure in self.solver.outputs)
+        ascending = all(low < high for low, high in zip((0.0, *fractions), fractions, strict=False))
+        if not ascending or fractions[-1] != 1.0:
+            raise invalid("these pressures do not lead from 0 to the load's", key=key, expected=expected)
+        return fractions
+
+    def to_yaml(self, files: Mapping[Path, str] | None = None) -> str:
+        """Return the resolved case as YAML that :func:`load_case` reads back to the same case.
+
+        Parameters
+        ----------
+        files
+            Data file → the path to write for it, relative to the folder the YAML will lie in.
+        """
+        data = self.model_dump(mode="json", exclude_none=True)
+        for region, material in self.materials.items():
+            if isinstance(material, FittedMaterial):
+                data["materials"][region]["fit"] = [(files or {}).get(path, str(path)) for path in material.fit]
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+
+
+DEFAULT_STEPS = 10
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+def load_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
+    """Read a case file.
+
+    Parameters
+    ----------
+    path
+        The YAML file; paths inside it are relative to its folder.
+    changes
+        Assignments ``key.path=value`` that replace what the file says (the command line's ``--set``).
+
+    Raises
+    ------
+    InputError
+        If the file or a change is not well formed; names the file (or ``--set``), the key and the value.
+    """
+    path = Path(path)
+    data = read_mapping(path)
+    data.setdefault("name", _name_from(path))
+    changed = [override(data, change) for change in changes]
+    try:
+        return Case.model_validate(data, context={"folder": path.parent})
+    except ValidationError as error:
+        found = explain(error, data)
+    except InputError as error:
+        found = error
+    key = found.key or ""
+    by_change = any(key == change or key.startswith(f"{change}.") for change in changed)
+    raise found.at(file="--set" if by_change else path)
+
+
+def _name_from(path: Path) -> str:
+    kept = "".join(character if character.isalnum() and character.isascii() else "-" for character in path.stem)
+    return kept.strip("-") or "case"

@@ -1,0 +1,37 @@
+"""Copies of a case's test data in its run's folder, so that the resolved ``case.yaml`` runs again anywhere."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from turgor.study.case import Case
+from turgor.study.materials import FittedMaterial
+
+FOLDER = "data"
+
+
+def data_names(case: Case) -> dict[Path, str]:
+    """Return each data file of the case and the name of its copy, relative to the run's folder."""
+    paths = [path for choice in case.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit]
+    names: dict[Path, str] = {}
+    for path in dict.fromkeys(paths):
+        name = f"{FOLDER}/{path.name}"
+        names[path] = name if name not in names.values() else f"{FOLDER}/{len(names)}-{path.name}"
+    return names
+
+
+def copy_data(names: dict[Path, str], folder: Path) -> None:
+    """Copy the data files into the run's folder; one that is there already stays."""
+    for path, name in names.items():
+        copy = folder / name
+        if not (copy.exists() and copy.samefile(path)):
+            copy.parent.mkdir(exist_ok=True)
+            shutil.copyfile(path, copy)
+
+
+def same_data(names: dict[Path, str], folder: Path) -> bool:
+    """Say whether every data file still is what its copy in the run's folder is."""
+    return all(
+        (folder / name).is_file() and (folder / name).read_bytes() == path.read_bytes() for path, name in names.items()
+    )

@@ -1,0 +1,78 @@
+"""The fit of a material as one document: what ``turgor fit --json`` prints, with the curves that a report draws."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from turgor.common.errors import InputError
+from turgor.materials.fit import FitReport
+from turgor.materials.least_squares import predict
+from turgor.results.plots import stress_strain
+
+_POINTS = 200
+"""Points of a drawn curve; a test with more points than that is thinned out for the drawing only."""
+
+
+def fit_document(report: FitReport) -> dict[str, Any]:
+    """Return the fit in plain values, with ``data.strain``, ``data.stress_MPa`` and a ``curve`` for each model.
+
+    Drawn is the first test that is not volumetric; the curves are the models' answers to its kind of deformation.
+    """
+    document: dict[str, Any] = report.as_dict()
+    test = next((test for test in report.tests if test.mode != "volumetric"), None)
+    if test is None:
+        return document
+    order = np.argsort(test.deformation, kind="stable")
+    shown = order[np.unique(np.linspace(0, len(order) - 1, _POINTS).astype(int))]
+    document["data"] |= {"strain": test.deformation[shown].tolist(), "stress_MPa": test.stress[shown].tolist()}
+    strain = np.linspace(min(0.0, float(test.deformation.min())), float(test.deformation.max()), _POINTS)
+    drawn = replace(test, stretch=strain if test.mode == "simple-shear" else 1.0 + strain, stress=np.zeros(_POINTS))
+    for entry, found in zip(document["fits"], report.fits, strict=True):
+        if found.material is not None:
+            entry["curve"] = {"strain": strain.tolist(), "stress_MPa": predict(found.material, drawn).tolist()}
+    return document
+
+
+def write_material(report: FitReport, path: str | Path) -> None:
+    """Write the recommended material as the YAML that a case file takes under ``materials``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    material = report.best
+    constants = {
+        constant.name: f"{value!r} {constant.unit}" if constant.unit else value
+        for constant, value in zip(material.constants(), material.parameters.values(), strict=True)
+    }
+    text = yaml.safe_dump({"model": material.name, "constants": constants}, sort_keys=False)
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"the material cannot be written: {error.strerror}", file=path) from error
+
+
+def write_fit_report(report: FitReport, folder: str | Path) -> Path:
+    """Write the fit as ``fit.json`` and, with its curves, as ``fit.html``; return the path of the latter.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    document = fit_document(report)
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        (place / "fit.json").write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        stress_strain(document).write_html(place / "fit.html", include_plotlyjs=True, full_html=True)
+    except OSError as error:
+        raise InputError(f"the report cannot be written: {error.strerror}", file=place) from error
+    return place / "fit.html"

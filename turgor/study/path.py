@@ -1,0 +1,137 @@
+"""A path of equilibria as the Python story hands it out: series with units, and the report."""
+
+from __future__ import annotations
+
+import pathlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.units import registry
+from turgor.mesh import Mesh
+from turgor.results import measures
+from turgor.results.archive import Row
+from turgor.results.history import row
+from turgor.results.record import StepRecord
+from turgor.results.report import report
+from turgor.results.store import RunStore
+from turgor.results.summary import Summary, summarise
+from turgor.study.machine import peak_memory_mb
+from turgor.study.validation import suggestion
+
+if TYPE_CHECKING:
+    import pint
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The equilibria from the first load step to the last, each with what is measured on it; it does not change.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the actuator.
+    dofs
+        Number of unknowns.
+    description
+        What was inflated, in plain values, for the report.
+    records
+        The equilibria.
+    """
+
+    mesh: Mesh
+    dofs: int
+    description: dict[str, Any]
+    records: tuple[StepRecord, ...] = ()
+
+    def longer(self, record: StepRecord) -> Path:
+        """Return the path with one more equilibrium."""
+        return replace(self, records=(*self.records, record))
+
+    @cached_property
+    def history(self) -> list[Row]:
+        """One row a step: key ending in its unit → number, as in ``history.csv``."""
+        return [row(record, self.mesh, measures.available(self.mesh)) for record in self.records]
+
+    def series(self, key: str) -> pint.Quantity[Any]:
+        """Return one number of every step, shape ``(steps,)``, with its unit.
+
+        Parameters
+        ----------
+        key
+            A key of the history without its unit: ``"twist"``, ``"tip_displacement_x"``.
+
+        Raises
+        ------
+        InputError
+            If the history has no such key.
+        """
+        columns = {name.rsplit("_", 1)[0]: name for name in self.history[0] if name.rsplit("_", 1)[-1] in _UNITS}
+        if key not in columns:
+            raise InputError("there is no such series", key="series", value=key, expected=suggestion(key, columns))
+        name = columns[key]
+        values = np.array([entry[name] for entry in self.history])
+        return registry().Quantity(values, _UNITS[name.rsplit("_", 1)[1]])
+
+    @property
+    def pressure(self) -> pint.Quantity[Any]:
+        """Pressure of each step in kPa, shape ``(steps,)``."""
+        return self.series("pressure")
+
+    @property
+    def bending_angle(self) -> pint.Quantity[Any]:
+        """Bending angle of each step in degrees, shape ``(steps,)``; needs the surfaces ``mount`` and ``tip-face``."""
+        return self.series("bending_angle")
+
+    @property
+    def tip_displacement(self) -> pint.Quantity[Any]:
+        """Displacement of the marker ``tip`` in mm, shape ``(steps, 3)``."""
+        parts = [self.series(f"tip_displacement_{axis}").magnitude for axis in "xyz"]
+        return registry().Quantity(np.column_stack(parts), "mm")
+
+    @property
+    def cavity_volume(self) -> pint.Quantity[Any]:
+        """Volume of all cavities in mm³, shape ``(steps,)``."""
+        return self.series("cavity_volume")
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether every state is stable; ``None`` if the linear solver cannot tell."""
+        answers = [record.solver["stable"] for record in self.records]
+        return None if None in answers else all(answers)
+
+    @property
+    def summary(self) -> Summary:
+        """The numbers of the last step, the mesh and the solver, as in ``summary.json``."""
+        return summarise(
+            self.history,
+            self.mesh,
+            converged=bool(self.records) and self.records[-1].fraction == 1.0,
+            reason="the full load was reached",
+            dofs=self.dofs,
+            wall_s=sum(record.solver["wall_s"] for record in self.records),
+            peak_memory_mb=peak_memory_mb(),
+        )
+
+    def report(self, folder: str | pathlib.Path, *, overwrite: bool = False) -> pathlib.Path:
+        """Write every step, the tables and the report into a folder and return the path of ``report.html``.
+
+        Raises
+        ------
+        InputError
+            If the folder holds a run already (unless `overwrite`) or cannot be written.
+        """
+        place = pathlib.Path(folder)
+        case = {"name": place.resolve().name, **self.description}
+        with RunStore.create(place, self.mesh, case, overwrite=overwrite) as store:
+            for record in self.records:
+                store.append(record)
+            store.finish(self.summary)
+        return report(place)
+
+
+_UNITS = {"kPa": "kPa", "MPa": "MPa", "mm": "mm", "mm3": "mm^3", "deg": "deg", "N": "N", "s": "s"}
+"""Ending of a key of the history → pint's name of the unit."""

@@ -1,0 +1,226 @@
+"""Run a case: materials, mesh, system, load path, store, measures, report, in one direction.
+
+Every state is on the disk before the next one begins, so that a run that was killed can be resumed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from turgor.common.errors import InputError, SolverError
+from turgor.common.log import logger
+from turgor.common.units import from_internal
+from turgor.fem.system import System
+from turgor.mesh import Mesh
+from turgor.mesh.generate import generate
+from turgor.results.report import report
+from turgor.results.store import RunStore
+from turgor.results.summary import Summary, summarise
+from turgor.solver.newton import Equilibrium
+from turgor.solver.path import solve_path
+from turgor.study.build import check_names, check_sizes, system_of
+from turgor.study.case import Case
+from turgor.study.datafiles import copy_data, data_names, same_data
+from turgor.study.fitting import fit_document
+from turgor.study.machine import peak_memory_mb
+from turgor.study.materials import FittedMaterial, build_materials
+from turgor.study.progress import Progress, Silent
+from turgor.study.runlog import RunLog
+from turgor.study.states import Recorder, to_equilibrium
+
+log = logger("study")
+
+MARK = "store.json"
+"""The file that makes a folder a run's folder; see :mod:`turgor.results.store`."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out of a run: its folder, its summary (as ``summary.json``) and whether the target was reached."""
+
+    folder: Path
+    summary: Mapping[str, Any]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the full load was reached."""
+        return bool(self.summary["converged"])
+
+    @property
+    def reason(self) -> str:
+        """Why the run ended."""
+        return str(self.summary["reason"])
+
+
+def run(
+    case: Case,
+    folder: str | Path,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a case and keep everything in a folder.
+
+    Parameters
+    ----------
+    case
+        What to run.
+    folder
+        Where the files go; see :class:`turgor.results.store.RunStore`.
+    resume
+        Continue the run in the folder behind its last stored step; a folder without a run begins one.
+    overwrite
+        Replace the run that is in the folder.
+    progress
+        Told about every stage and step.
+
+    Returns
+    -------
+    Run
+        Also where the solver stopped short of the full load: then ``converged`` is False, and the steps that were
+        reached, the summary and the report are in the folder all the same.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be run as it stands, the folder holds a run and neither `resume` nor `overwrite` is
+        asked for, or the run to resume is one of another case.
+    KeyboardInterrupt
+        Passed on with a message that says how to resume.
+    """
+    place = Path(folder)
+    stored = (place / MARK).is_file()
+    if stored and not (resume or overwrite):
+        expected = "another folder, or resume (--resume) or overwrite (--overwrite)"
+        raise InputError("the folder holds a run already", file=place, expected=expected)
+    with RunLog() as run_log:
+        return _Running(case, place, progress or Silent(), run_log).run(continues=stored and resume)
+
+
+def mesh_case(case: Case) -> Mesh:
+    """Return the mesh of a case, with the names that its supports and loads use made sure of.
+
+    Raises
+    ------
+    InputError
+        If there is no valid mesh, or a region, surface or cavity of the case is not on it.
+    """
+    mesh = generate(case.geometry, case.mesh.size)
+    check_names(case, mesh)
+    return mesh
+
+
+class _Running:
+    """One run on its way; the parts of :func:`run` share what is here."""
+
+    def __init__(self, case: Case, folder: Path, show: Progress, run_log: RunLog) -> None:
+        self.case, self.folder, self.show, self.run_log = case, folder, show, run_log
+        self.begun = time.perf_counter()
+        self.files = data_names(case)
+
+    def run(self, *, continues: bool) -> Run:
+        if any(isinstance(choice, FittedMaterial) for choice in self.case.materials.values()):
+            self.show.stage("fit")
+        materials, fit = build_materials(self.case.materials)
+        check_sizes(self.case, materials)
+        with self._resumed() if continues else nullcontext() as stored:
+            mesh = stored.mesh if stored else self._meshed()
+            self.show.stage("system")
+            system = system_of(self.case, mesh, materials)
+            # Nothing is written before everything that can be checked has been.
+            with stored or self._created(mesh) as store:
+                self.run_log.write_to(self.folder / "run.log")
+                log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
+                if fit:
+                    store.write_fit(fit_document(fit))
+                reason = self._walk(system, store)
+                summary = self._summary(system, store, reason)
+                store.finish(summary)
+        self.show.stage("report")
+        report(self.folder)
+        return Run(self.folder, summary)
+
+    def _meshed(self) -> Mesh:
+        self.show.stage("mesh")
+        return mesh_case(self.case)
+
+    def _created(self, mesh: Mesh) -> RunStore:
+        text = self.case.to_yaml(self.files)
+        store = RunStore.create(self.folder, mesh, text, measures=self.case.measures, overwrite=True)
+        copy_data(self.files, self.folder)
+        return store
+
+    def _resumed(self) -> RunStore:
+        store = RunStore.resume(self.folder)
+        if store.case_text != self.case.to_yaml(self.files) or not same_data(self.files, self.folder):
+            store.close()
+            raise InputError(
+                "the run in this folder is one of another case and cannot be resumed with this one",
+                file=self.folder,
+                expected="the same case file, --set changes and test data, or another folder",
+            )
+        log.info("resuming behind step %d", store.n_steps)
+        return store
+
+    def _walk(self, system: System, store: RunStore) -> str | None:
+        """Follow the load path; return why it stopped short, or ``None`` if it reached the end."""
+        fractions = self.case.fractions()
+        last = store.last()
+        start = to_equilibrium(system, last) if last else None
+        if last and last.fraction >= fractions[-1]:
+            return None
+        self.show.stage("load")
+        recorder = Recorder(system, store.n_steps)
+        try:
+            solve_path(
+                system,
+                fractions,
+                options=self.case.solver.options(),
+                start=start,
+                on_equilibrium=lambda equilibrium: self._keep(recorder, store, equilibrium),
+                on_progress=self._tell,
+            )
+        except SolverError as error:
+            log.error("%s %s", error, error.facts)
+            return str(error)
+        except KeyboardInterrupt:
+            log.warning("interrupted")
+            raise KeyboardInterrupt(
+                f"interrupted; {store.n_steps} finished steps are in {self.folder}, and --resume continues behind them"
+            ) from None
+        return None
+
+    def _keep(self, recorder: Recorder, store: RunStore, equilibrium: Equilibrium) -> None:
+        record = recorder.record(equilibrium)
+        store.append(record)
+        recorder.begin()
+        text = ", ".join(_load_text(name, value) for name, value in record.loads.items())
+        log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
+        self.show.advance(equilibrium.fraction, text)
+
+    def _tell(self, fraction: float, iteration: int, residual: float) -> None:
+        self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
+
+    def _summary(self, system: System, store: RunStore, reason: str | None) -> Summary:
+        return summarise(
+            store.history,
+            store.mesh,
+            converged=reason is None,
+            reason=reason or "the full load was reached",
+            dofs=system.n_dofs,
+            wall_s=time.perf_counter() - self.begun,
+            peak_memory_mb=peak_memory_mb(),
+        )
+
+
+def _load_text(name: str, value: float) -> str:
+    kind, _, place = name.partition(":")
+    if kind == "pressure":
+        return f"{from_internal(value, 'pressure', 'kPa'):.4g} kPa in {place}"
+    return f"{name} × {value:.4g}"

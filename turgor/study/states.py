@@ -1,0 +1,92 @@
+"""From the solver's equilibria to stored records, and from the last stored record back to where the solver stood."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from turgor.fem.fields import von_mises
+from turgor.fem.state import State
+from turgor.fem.system import System
+from turgor.results.record import StepRecord
+from turgor.solver.newton import Equilibrium
+
+
+def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: float) -> StepRecord:
+    """Return the record of an equilibrium.
+
+    Parameters
+    ----------
+    system
+        The system it is a state of.
+    equilibrium
+        What the solver delivered.
+    index
+        Number of the step.
+    wall_s
+        Duration of the step in s.
+    """
+    state = equilibrium.state
+    stress = von_mises(system, state)
+    return StepRecord(
+        index=index,
+        fraction=equilibrium.fraction,
+        loads={name: float(value) for name, value in zip(system.load_names, state.loads, strict=True)},
+        displacement=state.u,
+        element_pressure=system.element_pressure(state),
+        element_dilatation=state.dilatation,
+        von_mises=stress.nodal,
+        von_mises_max=stress.largest,
+        von_mises_p99=stress.percentile_99,
+        cavity_volumes={cavity.name: cavity.volume(state.u) for cavity in system.cavities},
+        solver={
+            "iterations": equilibrium.iterations,
+            "factorisations": equilibrium.factorisations,
+            "stable": equilibrium.stable,
+            "residual": float(equilibrium.residuals[-1]),
+            "wall_s": wall_s,
+        },
+    )
+
+
+class Recorder:
+    """Turns equilibria into records, counts them and times them.
+
+    Parameters
+    ----------
+    system
+        The system they are states of.
+    first
+        Number of the first record.
+    """
+
+    def __init__(self, system: System, first: int = 0) -> None:
+        self.system = system
+        self._next = first
+        self.begin()
+
+    def begin(self) -> None:
+        """Start the clock of the next step anew; what was done since the last record is not its work."""
+        self._begun = time.perf_counter()
+
+    def record(self, equilibrium: Equilibrium) -> StepRecord:
+        """Return the record of the next step."""
+        wall_s = time.perf_counter() - self._begun
+        made = to_record(self.system, equilibrium, self._next, wall_s)
+        self._next += 1
+        self.begin()
+        return made
+
+
+def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
+    """Return the equilibrium that a record was made of, as a start for the solver."""
+    state = State(
+        np.array(record.displacement),
+        np.array(record.element_dilatation),
+        np.array([record.loads[name] for name in system.load_names]),
+    )
+    stable = record.solver["stable"]
+    # The number of negative pivots is not stored; the solver only asks whether there are any.
+    pivots = None if stable is None else int(not stable)
+    return Equilibrium(state, record.fraction, (record.solver["residual"],), 0, pivots)
