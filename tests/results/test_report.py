@@ -124,15 +124,16 @@ def test_the_moving_body_comes_back_from_its_packing(folder: Path, finger: Mesh)
     triangles = np.frombuffer(base64.b64decode(packed["triangles"]), "<i4").reshape(3, -1).T
     assert np.array_equal(triangles, surface.triangles)
     store = RunStore.open(folder)
-    assert len(packed["frames"]) == store.n_steps
-    for record, frame in zip(store.records(), packed["frames"], strict=True):
+    assert len(packed["frames"]) == 1 + store.n_steps
+    assert packed["frames"][0]["label"] == "at rest"
+    for record, frame in zip(store.records(), packed["frames"][1:], strict=True):
         levels = np.frombuffer(base64.b64decode(frame["xyz"]), "<u2").reshape(3, -1).T
         places = np.array(packed["origin"]) + packed["step"] * levels
         assert places == pytest.approx((finger.points + record.displacement)[surface.nodes], abs=packed["step"])
         colours = np.frombuffer(base64.b64decode(frame["colour"]), np.uint8) * packed["colourStep"]
         assert colours == pytest.approx(record.von_mises[surface.nodes], abs=packed["colourStep"])
     assert packed["step"] < 0.003
-    assert packed["frames"][2]["label"] == "24 kPa · bent by 120.0°"
+    assert packed["frames"][3]["label"] == "24 kPa · bent by 120.0°"
 
 
 @pytest.mark.usefixtures("without_pictures")
@@ -202,6 +203,16 @@ def test_curves_begin_at_rest_and_mark_unstable_states(tmp_path: Path, small_fin
     rest = report_module._rest_row(RunStore.open(tmp_path / "run"), history[0])
     assert rest["bending_angle_deg"] == pytest.approx(0.0)
     assert rest["cavity_volume_mm3"] == pytest.approx(small_finger.enclosed_volume("cavity"))
+
+
+def test_angles_that_are_noise_are_left_out(run_folder: Path) -> None:
+    history = RunStore.open(run_folder).history
+    assert plots.turns("bending_angle_deg", history)
+    assert not plots.turns("twist_deg", history)
+    straight = [{**row, "bending_angle_deg": 0.003, "twist_deg": -40.0} for row in history]
+    assert not plots.turns("bending_angle_deg", straight)
+    assert plots.turns("twist_deg", straight)
+    assert not plots.turns("twist_deg", [{"pressure_kPa": 1.0}])
 
 
 def test_frames_keep_to_their_budget() -> None:

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
-from turgor.results.record import StepRecord
 from turgor.results.skin import flat_triangles, outside_faces, smooth_patches
 
 FloatArray = npt.NDArray[np.float64]
@@ -85,7 +84,7 @@ def bounds(positions: Sequence[FloatArray]) -> Bounds:
 def pack(
     surface: DrawnSurface,
     positions: Sequence[FloatArray],
-    records: Sequence[StepRecord],
+    stresses: Sequence[FloatArray],
     labels: Sequence[str],
     box: Bounds,
     scale_max: float,
@@ -97,11 +96,11 @@ def pack(
     surface
         What is drawn.
     positions
-        Drawn nodes in each state, each ``(d, 3)``, mm.
-    records
-        The states, for their stress.
+        Drawn nodes in each frame, each ``(d, 3)``, mm.
+    stresses
+        Their von Mises stress in each frame, each ``(d,)``, MPa.
     labels
-        What the page says of each state.
+        What the page says of each frame.
     box
         Holds every position.
     scale_max
@@ -109,10 +108,9 @@ def pack(
     """
     step = float((box.high - box.low).max()) / _POSITION_LEVELS
     frames = []
-    for place, record, label in zip(positions, records, labels, strict=True):
+    for place, stress, label in zip(positions, stresses, labels, strict=True):
         levels = np.rint((place - box.low) / step).astype("<u2")
-        share = np.clip(record.von_mises[surface.nodes] / scale_max, 0.0, 1.0)
-        colours = np.rint(share * _COLOUR_LEVELS).astype(np.uint8)
+        colours = np.rint(np.clip(stress / scale_max, 0.0, 1.0) * _COLOUR_LEVELS).astype(np.uint8)
         frames.append({"label": label, "xyz": _base64(levels.T), "colour": _base64(colours)})
     return {
         "origin": box.low.tolist(),

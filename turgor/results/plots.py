@@ -32,8 +32,8 @@ _TIP = Quantity("tip_displacement_mm", "Tip displacement / mm")
 
 MOTION = (
     Quantity("bending_angle_deg", "Bending angle / °"),
-    Quantity("twist_deg", "Twist / °"),
     _TIP,
+    Quantity("twist_deg", "Twist / °"),
     Quantity("elongation_mm", "Elongation / mm"),
     Quantity("max_displacement_mm", "Largest displacement / mm"),
     Quantity("cavity_volume_mm3", "Cavity volume / mm³"),
@@ -43,7 +43,8 @@ MOTION = (
 
 _LOAD = (Quantity("pressure_kPa", "Pressure / kPa"), Quantity("fraction", "Load parameter"))
 _COMPONENTS = tuple((axis, f"tip_displacement_{axis}_mm") for axis in "xyz")
-_NEGLIGIBLE = 1e-3
+_ANGLES = ("bending_angle_deg", "twist_deg")
+_NEGLIGIBLE_ANGLE_DEG, _NEGLIGIBLE_SHARE = 0.1, 1e-3
 
 _SCENE_FILL = 0.8
 """Units of plotly's orthographic scene, of which two make its height, that half of the body's height takes up."""
@@ -60,8 +61,8 @@ def load_motion(history: Sequence[Row]) -> go.Figure:
     Parameters
     ----------
     history
-        Rows of the history, at least one; a state that is not stable has an open marker. Quantities that stay
-        negligible beside another of the same unit (the twist of a finger that only bends) are left out.
+        Rows of the history, at least one; a state that is not stable has an open marker. Angles that are only noise
+        are left out.
     """
     load = load_axis(history)
     shown = [quantity for quantity in MOTION if _is_worth_showing(quantity.key, history)]
@@ -90,10 +91,16 @@ def _is_worth_showing(key: str, history: Sequence[Row]) -> bool:
         return False
     if key == "max_displacement_mm":
         return not _is_worth_showing(_TIP.key, history)
-    partner = {"twist_deg": "bending_angle_deg", "bending_angle_deg": "twist_deg"}.get(key)
-    if partner is None or not all(partner in entry for entry in history):
-        return True
-    return _largest(key, history) > _NEGLIGIBLE * _largest(partner, history)
+    return key not in _ANGLES or turns(key, history)
+
+
+def turns(key: str, history: Sequence[Row]) -> bool:
+    """Say whether the run has the angle `key` and it is more than noise, by itself and beside the other angle.
+
+    A tube that only grows has angles of some thousandths of a degree from its mesh, which is not symmetric.
+    """
+    found = {angle: _largest(angle, history) for angle in _ANGLES if all(angle in entry for entry in history)}
+    return found.get(key, 0.0) > max(_NEGLIGIBLE_ANGLE_DEG, _NEGLIGIBLE_SHARE * max(found.values(), default=0.0))
 
 
 def _largest(key: str, history: Sequence[Row]) -> float:

@@ -123,17 +123,20 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     surface = animation.surface_that_fits(mesh, store.n_steps)
     shown = animation.frames_that_fit(store.n_steps, len(surface.nodes))
     records = [store.load(index) for index in shown]
-    positions = [(mesh.points + record.displacement)[surface.nodes] for record in records]
-    box = animation.bounds([mesh.points[surface.nodes], *positions])
-    camera = camera_for(np.concatenate([mesh.points[surface.nodes], *positions]), _SCENE_ASPECT)
-    labels = [_frame_label(history[index], load) for index in shown]
+    nodes = surface.nodes
+    rest = mesh.points[nodes]
+    positions = [rest, *(rest + record.displacement[nodes] for record in records)]
+    stresses = [np.zeros(len(nodes)), *(record.von_mises[nodes] for record in records)]
+    labels = ["at rest", *(_frame_label(history, index, load) for index in shown)]
+    box = animation.bounds(positions)
+    camera = camera_for(np.concatenate(positions), _SCENE_ASPECT)
     pictures, note = _pictures(store, history, load, scale_max)
     curve = [_rest_row(store, history[0]), *history] if history[0]["fraction"] > 0.0 else history
     return {
-        "cards": _cards(history[-1]),
+        "cards": _cards(history),
         "motion": _as_json(plots.load_motion(curve)),
         "scene": _as_json(plots.body_scene(box.low, box.high, camera, scale_max)),
-        "frames": animation.pack(surface, positions, records, labels, box, scale_max),
+        "frames": animation.pack(surface, positions, stresses, labels, box, scale_max),
         "load_title": load.title.split(" / ")[0],
         "pictures": pictures,
         "pictures_note": note,
@@ -145,10 +148,10 @@ def _as_json(figure: go.Figure) -> str:
     return str(figure.to_json()).replace("</", "<\\/")
 
 
-def _frame_label(entry: Row, load: plots.Quantity) -> str:
-    label = _load_label(entry, load)
-    bending = entry.get("bending_angle_deg")
-    return label if bending is None else f"{label} · bent by {bending:.1f}°"
+def _frame_label(history: Sequence[Row], index: int, load: plots.Quantity) -> str:
+    label = _load_label(history[index], load)
+    bends = plots.turns("bending_angle_deg", history)
+    return f"{label} · bent by {history[index]['bending_angle_deg']:.1f}°" if bends else label
 
 
 def _load_label(entry: Row, load: plots.Quantity) -> str:
@@ -156,12 +159,14 @@ def _load_label(entry: Row, load: plots.Quantity) -> str:
     return f"{value} kPa" if load.key == "pressure_kPa" else f"load parameter {value}"
 
 
-def _cards(final: Row) -> list[Card]:
-    values = dict(final)
+def _cards(history: Sequence[Row]) -> list[Card]:
+    values = dict(history[-1])
     tip = [values.get(f"tip_displacement_{axis}_mm") for axis in "xyz"]
     if None not in tip:
         values["tip_displacement_mm"] = math.hypot(*(float(component) for component in tip if component is not None))
         del values["max_displacement_mm"]
+    if not plots.turns("bending_angle_deg", history):
+        values.pop("bending_angle_deg", None)
     return [Card(title, number(float(values[key])), unit) for key, title, unit in _HEADLINES if key in values]
 
 
