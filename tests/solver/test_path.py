@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from samples import neo_hookean
@@ -11,9 +13,10 @@ from turgor.fem.loads import Force, Gravity, Pressure, Traction
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.system import System
 from turgor.mesh.structured import box, shell_octant
-from turgor.solver.linear import SuperLU
+from turgor.solver.linear import SuperLU, make_linear_solver
 from turgor.solver.newton import NewtonOptions, NotConvergedError, find_equilibrium
-from turgor.solver.path import PathOptions, StoppedShortError, output_fractions, solve_path
+from turgor.solver.path import LimitPressureError, PathOptions, output_fractions, solve_path
+from turgor.solver.volume import VolumeWalk
 
 PLANES = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
 
@@ -81,19 +84,46 @@ def test_going_on_from_a_stored_equilibrium_gives_the_same():
     np.testing.assert_allclose(rest[0].state.u, whole[1].state.u, atol=1e-6 * np.abs(whole[1].state.u).max())
 
 
-def test_beyond_the_limit_pressure_the_walk_stops_at_the_last_good_state():
-    # The thick neo-Hookean sphere has no equilibrium above p/μ = 0.4935.
+def test_beyond_the_limit_pressure_the_walk_ends_at_the_limit():
+    # The thick neo-Hookean sphere has no equilibrium above p/μ = 0.4935, reached at λa = 1.603.
     reached = []
-    with pytest.raises(StoppedShortError, match="beyond 4") as stop:
-        solve_path(sphere(0.06, n=2), output_fractions(6), on_equilibrium=reached.append)
+    system = sphere(0.06, n=2)
+    with pytest.raises(LimitPressureError, match=r"limit is reached at 49\.\d+ kPa") as stop:
+        solve_path(system, output_fractions(6), on_equilibrium=reached.append)
     assert [round(e.fraction, 6) for e in reached[:-1]] == [round(k / 6, 6) for k in (1, 2, 3, 4)]
-    facts = stop.value.facts
-    assert reached[-1].fraction == facts["last_fraction"] > 4 / 6  # the last good state is delivered too
-    assert reached[-1].iterations > 0
-    assert 0.0485 < facts["pressure:inner_kPa"] / 1e3 <= 0.0498
-    assert facts["residuals"]
-    assert len(facts["worst_element_at_mm"]) == 3
+    facts, limit = stop.value.facts, stop.value.limit
+    assert facts["pressure:inner_kPa"] == pytest.approx(49.35, rel=2e-3)
+    assert limit.maximum
     assert stop.value.exit_code == 3
+    assert reached[-1].fraction == facts["last_fraction"] > 4 / 6  # the limit state is delivered too
+    assert reached[-1].iterations > 0
+    inner = system.mesh.points[system.mesh.surface_nodes("inner")]
+    moved = inner + limit.equilibrium.state.u[system.mesh.surface_nodes("inner")]
+    assert np.linalg.norm(moved, axis=1).mean() == pytest.approx(1.603, rel=5e-3)
+    # the sphere gives way by growing: the mode is radial
+    mode = limit.mode[system.mesh.surface_nodes("inner")]
+    radial = np.einsum("ni,ni->n", mode, inner) / np.linalg.norm(inner, axis=1)
+    assert np.abs(radial).min() > 0.9 * np.abs(radial).max()
+
+
+def test_volume_control_goes_on_behind_the_limit():
+    system = sphere(0.01, n=2)
+    linear = make_linear_solver(system.pattern.row_start, system.pattern.column)
+    start = solve_path(system, [1.0])[0]
+    step = 0.5 * system.conjugate(system.reference_state())
+    inner = system.mesh.surface_nodes("inner")
+    falling = 0
+    for found in itertools.islice(VolumeWalk(system, linear, start, step, NewtonOptions()), 8):
+        stretch = np.linalg.norm(system.mesh.points[inner] + found.state.u[inner], axis=1).mean()
+        outer = (1 + (stretch**3 - 1) / 1.5**3) ** (1 / 3)
+        pressure = 0.1 * ((2 / outer + 0.5 / outer**4) - (2 / stretch + 0.5 / stretch**4))
+        assert float(found.state.loads[0]) == pytest.approx(pressure, rel=5e-3)
+        assert found.iterations <= 6
+        if found.negative_pivots is not None:
+            assert found.negative_pivots == (0 if found.rising else 1)
+            assert found.stable_at_fixed_volume
+        falling += not found.rising
+    assert falling >= 2
 
 
 def test_failure_tells_the_residuals_and_the_worst_element():

@@ -62,6 +62,10 @@ class Cavity:
         if pressure != 0.0:
             add_at_nodes(self.nodes, -pressure * self._gradient(state.u), out)
 
+    def conjugate(self, state: State) -> float:
+        """Return V, mm³."""
+        return self.volume(state.u)
+
     def load_gradient(self, state: State, out: Floats) -> None:
         """Add −∂V/∂u, mm²."""
         add_at_nodes(self.nodes, -self._gradient(state.u), out)

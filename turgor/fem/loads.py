@@ -76,6 +76,10 @@ class DeadLoad:
         """Add −factor · f, N."""
         out -= state.loads[self.channel] * self.nodal
 
+    def conjugate(self, state: State) -> float:
+        """Return f · u, N mm."""
+        return float(np.vdot(self.nodal, state.u))
+
     def load_gradient(self, state: State, out: Floats) -> None:
         """Add −f, N."""
         del state

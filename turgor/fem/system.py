@@ -17,7 +17,7 @@ from turgor.fem.pattern import SparsePattern, packed_size
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
-from turgor.fem.term import Term
+from turgor.fem.term import Loaded, Term
 from turgor.fem.threads import prefer_light_threads
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
@@ -66,6 +66,7 @@ class System:
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
         self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead)
+        self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead)
 
         free = ~self.constraints.fixed.ravel()
         groups = [term.nodes for term in self.terms]
@@ -95,6 +96,21 @@ class System:
     def loaded_at_start(self) -> bool:
         """Whether something acts already at load fraction zero (weight)."""
         return bool(np.any(self.loads_at(0.0)))
+
+    def conjugate(self, state: State) -> float:
+        """Return −∂Π/∂f, f the load fraction: what the loads that grow with it work on, N mm (pressure × volume)."""
+        growth = self.loads_at(1.0) - self.loads_at(0.0)
+        return sum(float(growth[term.channel]) * term.conjugate(state) for term in self._loaded)
+
+    def load_direction(self, state: State) -> Floats:
+        """Return ∂²Π/∂u∂f ``(n_points, 3)``, N: the derivative of the forces by the load fraction."""
+        growth = self.loads_at(1.0) - self.loads_at(0.0)
+        total = np.zeros_like(state.u)
+        for term in self._loaded:
+            part = np.zeros_like(state.u)
+            term.load_gradient(state, part)
+            total += growth[term.channel] * part
+        return total
 
     def energy(self, state: State) -> float:
         """Return Π, N mm."""

@@ -40,8 +40,12 @@ class Loaded(Protocol):
 
     channel: int
 
+    def conjugate(self, state: State) -> float:
+        """Return what the load works on, minus the derivative of the energy by its value: a cavity's volume, mm³."""
+        ...
+
     def load_gradient(self, state: State, out: Floats) -> None:
-        """Add the derivative of :meth:`Term.force` with respect to the load's value to ``out (n_points, 3)``."""
+        """Add the derivative of :meth:`Term.force` by the load's value to ``out (n_points, 3)``."""
         ...
 
 

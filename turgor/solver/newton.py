@@ -49,6 +49,9 @@ class Equilibrium:
         Number of matrices factorised.
     negative_pivots
         Negative eigenvalues of the tangent at (or next to) the equilibrium; ``None`` if the linear solver cannot tell.
+    compliance
+        Under volume control, the derivative of the conjugate (pressure × volume) by the load fraction along the path of
+        equilibria: negative where the pressure falls while the volume grows.
     """
 
     state: State
@@ -56,6 +59,7 @@ class Equilibrium:
     residuals: tuple[float, ...]
     factorisations: int
     negative_pivots: int | None
+    compliance: float | None = None
 
     @property
     def iterations(self) -> int:
@@ -64,8 +68,24 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool | None:
-        """Whether Π has a minimum here; ``None`` if the linear solver cannot tell."""
+        """Whether Π has a minimum here at given loads; ``None`` if the linear solver cannot tell."""
         return None if self.negative_pivots is None else self.negative_pivots == 0
+
+    @property
+    def rising(self) -> bool:
+        """Whether the load grows with the volume along the path here (known under volume control only)."""
+        return self.compliance is not None and self.compliance > 0.0
+
+    @property
+    def stable_at_fixed_volume(self) -> bool | None:
+        """Whether Π has a minimum here among states of the same volume; ``None`` if that is not known.
+
+        The bordered matrix has the tangent's negative eigenvalues and one more where the compliance is positive;
+        exactly one belongs to the volume's own multiplier.
+        """
+        if self.negative_pivots is None or self.compliance is None:
+            return None
+        return self.negative_pivots + (self.compliance > 0.0) == 1
 
 
 class NotConvergedError(SolverError):
@@ -84,13 +104,32 @@ def find_equilibrium(
     fraction: float,
     options: NewtonOptions,
     on_iteration: Callable[[int, float], None] | None = None,
+    *,
+    conjugate: float | None = None,
 ) -> Equilibrium:
-    """Find the equilibrium at a load fraction from a guess.
+    """Find the equilibrium at a load fraction, or at a given volume, from a guess.
 
     Each iteration solves with the tangent whose geometric part takes the pressures that the previous one predicted
     (``State.dilatation``), while the right-hand side is the exact out-of-balance force. Eliminating the
     pressures from Newton's method on the mixed problem gives the same iteration, so that it needs no
     more steps at a bulk modulus of 1e5 μ than at μ.
+
+    Parameters
+    ----------
+    system, linear
+        What is to be in equilibrium, and the solver of its pattern.
+    guess
+        Where the iteration starts.
+    fraction
+        The load fraction; with `conjugate`, only its first guess.
+    options
+        Tolerance and iteration limit.
+    on_iteration
+        Told the number of each iteration and the relative residual before it.
+    conjugate
+        If given, :meth:`System.conjugate` is brought to this value (for one cavity: its volume times its full
+        pressure) and the load fraction is an unknown: the bordered system of volume control, one factorisation and
+        two right-hand sides an iteration.
 
     Raises
     ------
@@ -103,17 +142,20 @@ def find_equilibrium(
     # Where all forces are tiny, rounding is not to be mistaken for imbalance.
     smallest = _rounding(system) / options.tolerance
     residuals: list[float] = []
+    compliance: float | None = None
     while True:
         force, scale = system.forces(state)
         residual = system.free_part(force)
         relative = float(np.linalg.norm(residual)) / max(scale, smallest)
+        gap = 0.0 if conjugate is None else conjugate - system.conjugate(state)
         residuals.append(relative)
         if on_iteration is not None:
             on_iteration(len(residuals) - 1, relative)
         if not np.isfinite(relative):
             raise _failure("the forces are not finite any more", system, state, residuals)
-        if relative <= options.tolerance and not moving:
-            return _accepted(system, linear, state, fraction, residuals)
+        on_target = not moving and abs(gap) <= options.tolerance * abs(conjugate or 0.0)
+        if relative <= options.tolerance and on_target:
+            return _accepted(system, linear, state, fraction, residuals, compliance)
         if len(residuals) > options.max_iterations:
             raise _failure(f"no equilibrium within {options.max_iterations} iterations", system, state, residuals)
         try:
@@ -126,31 +168,45 @@ def find_equilibrium(
         if moving:
             du += pending
             moving = False
-        state = _advanced(system, state, du, residuals)
+        change = 0.0
+        if conjugate is not None:
+            direction = system.load_direction(state)
+            response = system.nodal(linear.solve(-system.free_part(direction)))
+            compliance = -float(np.vdot(direction, response))
+            change = (gap + float(np.vdot(direction, du))) / compliance
+            du += change * response
+        state, damping = _advanced(system, state, du, residuals)
+        fraction += damping * change
+        state = state.with_(loads=system.loads_at(fraction))
 
 
-def _advanced(system: System, state: State, du: Floats, residuals: list[float]) -> State:
-    """Return the state after the step, shortened where it would turn an element inside out."""
+def _advanced(system: System, state: State, du: Floats, residuals: list[float]) -> tuple[State, float]:
+    """Return the state after the step, shortened where it would turn an element inside out, and by how much."""
     damping = 1.0
     while damping >= SMALLEST_DAMPING:
         step = damping * du
         trial = state.u + step
         worst, _ = system.worst_jacobian(trial)
         if worst > 0.0:
-            return state.with_(u=trial, dilatation=system.updated_dilatation(state, step))
+            return state.with_(u=trial, dilatation=system.updated_dilatation(state, step)), damping
         damping *= 0.5
     raise _failure("an element would turn inside out", system, state.with_(u=state.u + du), residuals)
 
 
 def _accepted(
-    system: System, linear: LinearSolver, state: State, fraction: float, residuals: list[float]
+    system: System,
+    linear: LinearSolver,
+    state: State,
+    fraction: float,
+    residuals: list[float],
+    compliance: float | None,
 ) -> Equilibrium:
     state = state.with_(dilatation=system.dilatation(state.u))
     factorisations = len(residuals) - 1
     if factorisations == 0 or residuals[-2] > NEAR:
         linear.factorise(system.stiffness(state))
         factorisations += 1
-    return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots)
+    return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots, compliance)
 
 
 def _rounding(system: System) -> float:

@@ -15,6 +15,7 @@ from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+from turgor.solver.volume import LimitPoint, VolumeWalk
 
 log = logger("solver")
 
@@ -22,6 +23,12 @@ CUT = 0.4
 GROWTH = 1.6
 EASY = 7
 """A step that took no more iterations than this lets the next one grow."""
+
+FAILURES = 3
+"""After so many failed steps in a row, volume control looks for what is in the way."""
+
+VOLUME_STEPS = 60
+"""Steps that volume control may take between two requested loads."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +50,17 @@ class PathOptions:
 
 class StoppedShortError(SolverError):
     """No equilibrium was found beyond the last one delivered."""
+
+
+class LimitPressureError(StoppedShortError):
+    """The load has a maximum on the way: beyond it there is no equilibrium, whatever the solver.
+
+    ``limit`` is the state of the maximum, found by volume control, with the eigenmode in which the actuator gives way.
+    """
+
+    def __init__(self, reason: str, *, advice: str, facts: dict[str, object], limit: LimitPoint) -> None:
+        super().__init__(reason, advice=advice, facts=facts)
+        self.limit = limit
 
 
 def solve_path(
@@ -129,6 +147,7 @@ class _Walk:
         self.step = options.largest_step
         self._residuals: list[float] = []
         self._factorisations = 0
+        self._failures = 0
 
     @property
     def has_moved(self) -> bool:
@@ -163,6 +182,9 @@ class _Walk:
 
     def _arrive(self, found: Equilibrium) -> None:
         self.here = found
+        self._count(found)
+
+    def _count(self, found: Equilibrium) -> None:
         self._residuals += found.residuals[:-1]
         self._factorisations += found.factorisations
 
@@ -173,16 +195,62 @@ class _Walk:
             found = self._attempt(aim, self._predicted(aim))
         except NotConvergedError as error:
             log.info("step to %.4g failed: %s", aim, error.reason)
-            self._shorten(size, error)
-            return None
+            return self._failed(aim, size, error)
         if found.stable is False and self.here.stable is not False and size > 4 * self.options.smallest_step:
             # A long step can land on an unstable branch that a shorter one would not have met.
             log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
             self.step = CUT * size
             return None
+        self._failures = 0
         if found.iterations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
         return found
+
+    def _failed(self, aim: float, size: float, error: NotConvergedError) -> Equilibrium | None:
+        """Shorten the step; where that has not helped, go on by volume control."""
+        self._failures += 1
+        self.step = CUT * size
+        if self._failures == FAILURES and not self.system.constraints.moves:
+            found = self._by_volume(aim)
+            if found is not None:
+                return found
+        if self.step < self.options.smallest_step:
+            raise self._stopped(error) from error
+        return None
+
+    def _by_volume(self, aim: float) -> Equilibrium | None:
+        """Follow the path by volume to the load fraction `aim`, or to the limit before it.
+
+        Returns ``None`` where volume control does not get on either.
+
+        Raises
+        ------
+        LimitPressureError
+            If the load has a maximum before `aim`.
+        """
+        log.info("going on by volume control from %.4g", self.here.fraction)
+        system = self.system
+        now = system.conjugate(self.here.state)
+        rest = system.conjugate(self.before.state if self.before else system.reference_state())
+        step = 0.5 * abs(now - rest) or 0.05 * abs(now)
+        if step == 0.0:
+            return None
+        walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton)
+        previous = walk.here
+        for found in itertools.islice(walk, VOLUME_STEPS):
+            self._count(found)
+            if self.on_progress is not None:
+                self.on_progress(found.fraction, found.iterations, found.residuals[-1])
+            if previous.rising and not found.rising:
+                raise self._at_limit(walk.limit_between(previous, found))
+            if found.fraction >= aim:
+                try:
+                    return self._attempt(aim, found.state)
+                except NotConvergedError:
+                    return None
+            self.before, self.here = previous, found
+            previous = found
+        return None
 
     def _attempt(self, aim: float, guess: State) -> Equilibrium:
         def report(iteration: int, residual: float) -> None:
@@ -204,25 +272,35 @@ class _Walk:
         dilatation = here.state.dilatation + reach * (here.state.dilatation - self.before.state.dilatation)
         return here.state.with_(u=u, dilatation=dilatation)
 
-    def _shorten(self, size: float, error: NotConvergedError) -> None:
-        self.step = CUT * size
-        if self.step < self.options.smallest_step:
-            raise self._stopped(error) from error
-
     def _stopped(self, error: NotConvergedError) -> StoppedShortError:
+        facts = self._facts()
+        return StoppedShortError(
+            f"no equilibrium was found beyond {_load_text(facts)} ({error.reason})",
+            advice=(
+                "The material may lose its stability there, or the mesh may be too coarse where it is most distorted"
+            ),
+            facts=facts | error.facts,
+        )
+
+    def _at_limit(self, limit: LimitPoint) -> LimitPressureError:
+        self._arrive(limit.equilibrium)
+        facts = self._facts()
+        worst = int(np.argmax(np.linalg.norm(limit.mode, axis=1)))
+        facts["mode_largest_at_mm"] = [round(float(x), 3) for x in self.system.mesh.points[worst]]
+        return LimitPressureError(
+            f"the limit is reached at {_load_text(facts)}: beyond it the actuator grows while the pressure falls",
+            advice="A thicker wall, a stiffer or a stiffening material raises the limit",
+            facts=facts,
+            limit=limit,
+        )
+
+    def _facts(self) -> dict[str, object]:
         here = self.here
         facts: dict[str, object] = {"last_fraction": here.fraction, "last_stable": here.stable}
         for load, name, value in zip(self.system.loads, self.system.load_names, here.state.loads, strict=True):
             pressure = isinstance(load, Pressure)
             facts[f"{name}_kPa" if pressure else name] = float(value) * (1e3 if pressure else 1.0)
-        return StoppedShortError(
-            f"no equilibrium was found beyond {_load_text(facts)} ({error.reason})",
-            advice=(
-                "The actuator may have a limit pressure there, the material may lose its stability, or the mesh may be "
-                "too coarse where it is most distorted"
-            ),
-            facts=facts | error.facts,
-        )
+        return facts
 
 
 def _load_text(facts: dict[str, object]) -> str:
