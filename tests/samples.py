@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from turgor.fem.state import State
@@ -19,8 +21,8 @@ def random_state(system: System, size: float, seed: int = 0, fraction: float = 0
     """A random displacement of a given size with the dilatations that belong to it."""
     u = size * np.random.default_rng(seed).standard_normal(system.mesh.points.shape)
     assert system.worst_jacobian(u)[0] > 0.05
-    return State(u, system.dilatation(u), system.loads_at(fraction))
+    return system.consistent(u, system.loads_at(fraction))
 
 
 def shifted(state: State, direction: np.ndarray, step: float) -> State:
-    return state.with_(u=state.u + step * direction)
+    return replace(state, u=state.u + step * direction)

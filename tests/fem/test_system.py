@@ -67,7 +67,7 @@ def test_oblique_sliding_equals_the_straight_one_seen_from_a_turned_frame():
     assert len(straight.constraints.frame_nodes) == 0
     results = []
     for system in (straight, oblique):
-        state = system.reference_state().with_(loads=system.loads_at(1.0))
+        state = system.reference_state().with_loads(system.loads_at(1.0))
         matrix = full_matrix(system, system.stiffness(state))
         right = system.free_part(system.forces(state)[0])
         results.append(system.nodal(np.linalg.solve(matrix, -right)))
@@ -99,7 +99,7 @@ def test_pressure_does_the_work_of_the_volume_swept():
     mesh = shell_octant(1.0, 1.5, 2)
     system = System(mesh, {"body": neo_hookean()}, PLANES, [Pressure("inner", 0.1)])
     force = np.zeros_like(mesh.points)
-    system.cavities[0].force(system.reference_state().with_(loads=np.array([0.1])), force)
+    system.cavities[0].force(system.reference_state().with_loads(np.array([0.1])), force)
     # Growing in all directions at unit rate, the octant sweeps 3 V; along x alone, V.
     volume = 4 / 3 * np.pi / 8
     assert np.vdot(force, mesh.points) == pytest.approx(-0.1 * 3 * volume, rel=2e-4)

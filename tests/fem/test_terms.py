@@ -53,7 +53,7 @@ def check_derivatives(term, state, n_points):
     assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-7)
 
     packed = np.empty((len(term.nodes), packed_size(3 * term.nodes.shape[1])))
-    term.stiffness(state, packed)
+    term.stiffness(state, term.lagged_at(state.u), packed)
     product = np.zeros((n_points, 3))
     block_products(term.nodes, packed, direction, product)
     expected = differences(force, state, direction)
@@ -132,6 +132,6 @@ def test_load_gradient(octant, which):
     state = random_state(system, 0.02)
     gradient = np.zeros_like(state.u)
     system.terms[1].load_gradient(state, gradient)
-    more, less = (system.forces(state.with_(loads=state.loads + h))[0] for h in (1e-3, -1e-3))
+    more, less = (system.forces(state.with_loads(state.loads + h))[0] for h in (1e-3, -1e-3))
     assert np.linalg.norm(gradient) > 1e-3
     np.testing.assert_allclose(gradient, (more - less) / 2e-3, atol=1e-9)

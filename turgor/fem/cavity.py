@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from turgor.fem.elements import TRI6
 from turgor.fem.kernels import FASTMATH
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes, pack_symmetric
+from turgor.fem.term import Unlagged, add_at_nodes, pack_symmetric
 from turgor.mesh.opening import volume_field
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-class Cavity:
+class Cavity(Unlagged):
     """−p V(u): the air in a closed cavity of volume V at pressure p.
 
     V is a flux through the deformed wall, ∫ x · n/3 dA where nothing cuts it, so that force and stiffness are its exact
@@ -70,8 +70,9 @@ class Cavity:
         """Add −∂V/∂u, mm²."""
         add_at_nodes(self.nodes, -self._gradient(state.u), out)
 
-    def stiffness(self, state: State, out: Floats) -> None:
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill −p ∂²V/∂u², N/mm."""
+        del lagged
         hessian = np.empty((len(self.nodes), 18, 18))
         _hessians(self.points + state.u, self.nodes, *_RULE, self.field.axes, hessian)
         hessian *= -state.loads[self.channel]

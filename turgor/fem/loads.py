@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from turgor.fem.elements import TET10, TRI6
 from turgor.fem.state import State
 from turgor.fem.supports import face_normals
-from turgor.fem.term import NO_NODES
+from turgor.fem.term import NO_NODES, Unlagged
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -51,7 +51,7 @@ class Force:
 Load = Pressure | Gravity | Traction | Force
 
 
-class DeadLoad:
+class DeadLoad(Unlagged):
     """−factor · f · u with constant nodal forces f: gravity and dead tractions.
 
     Parameters
@@ -85,7 +85,7 @@ class DeadLoad:
         del state
         out -= self.nodal
 
-    def stiffness(self, state: State, out: Floats) -> None:
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill nothing: a dead load has no stiffness."""
 
 

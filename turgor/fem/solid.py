@@ -22,10 +22,9 @@ class Solid:
     """∫ W(F̄) dV + Σ_e U(θ_e) V_e over one material region, θ_e the element's ratio of volumes.
 
     The mean dilatation (Nagtegaal, Parks and Rice 1974; Simo, Taylor and Pister 1985) makes the ten-node
-    tetrahedron free of volumetric locking. The pressure U'(θ) of the geometric stiffness comes from
-    ``state.dilatation``, which Newton updates as an unknown (:meth:`updated_dilatation`): the residual is the
-    gradient of the energy all the same, but the iteration then sees the volume constraint as linear and
-    converges in long steps at any bulk modulus.
+    tetrahedron free of volumetric locking. The dilatations are what lags (:class:`turgor.fem.term.Term`): the
+    geometric stiffness uses the pressure U'(θ) of the lagged ones, so that the iteration sees the volume
+    constraint as linear and converges in long steps at any bulk modulus.
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ class Solid:
         self._tangent = np.empty((m, q, TANGENT_SIZE))
         self._force = np.empty((m, n, 3))
 
-    def dilatation(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats) -> Floats:
         """Return each element's ratio of deformed to reference volume at displacement `u`, ``(m,)``."""
         self._deform(u)
         return self._dilatation.copy()
@@ -79,18 +78,17 @@ class Solid:
         kernels.element_forces(self._F, self.G, self.dV, self._tau, pressure, self._force)
         add_at_nodes(self.nodes, self._force, out)
 
-    def stiffness(self, state: State, out: Floats) -> None:
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the element stiffnesses, the pressure condensed."""
         self._deform(state.u)
         self._respond()
-        lagged = state.dilatation[self.index]
         pressure = self.material.volumetric.pressure(lagged)
         bulk = self.material.volumetric.stiffness(lagged)
         assert out.shape[1] == packed_size(3 * self.nodes.shape[1])
         kernels.element_stiffness(self._F, self.G, self.dV, self._tau, self._tangent, pressure, bulk, out)
 
-    def updated_dilatation(self, state: State, du: Floats) -> Floats:
-        """Return the dilatation that Newton's step `du` (n_points, 3) predicts, linearised at the state, ``(m,)``."""
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return the dilatations that the step `du` (n_points, 3) predicts, linearised at the state, ``(m,)``."""
         self._deform(state.u)
         kernels.volume_gradients(self._F, self.G, self.dV, self._force)
         change = np.einsum("ean,ean->e", self._force, du[self.nodes])

@@ -18,18 +18,23 @@ class State:
     ----------
     u
         Displacement ``(n_points, 3)``, mm.
-    dilatation
-        Mean dilatation of each element as an unknown of its own, ``(n_cells,)``. At an equilibrium it equals the ratio
-        of deformed to reference volume; during Newton's iteration it lags behind, and the tangent
-        uses the pressure that belongs to it.
+    lagged
+        For each term, the quantities that Newton's iteration treats as unknowns of their own: the mean dilatation of
+        every element of a solid, nothing for most terms. At an equilibrium they follow from the displacement; on the
+        way they lag behind it, and the tangent uses the forces that belong to them.
     loads
         Value of every load ``(n_loads,)``: a cavity's pressure in MPa, a factor for the others.
     """
 
     u: Floats
-    dilatation: Floats
+    lagged: tuple[Floats, ...]
     loads: Floats
 
-    def with_(self, **changes: Floats) -> State:
-        """Return a copy with some of the three arrays replaced."""
-        return replace(self, **changes)
+    def with_loads(self, loads: Floats) -> State:
+        """Return a copy under other loads."""
+        return replace(self, loads=loads)
+
+    def beyond(self, before: State, reach: float) -> State:
+        """Return the state `reach` times the way from `before` to this one further on, in a straight line."""
+        lagged = tuple(now + reach * (now - then) for now, then in zip(self.lagged, before.lagged, strict=True))
+        return replace(self, u=self.u + reach * (self.u - before.u), lagged=lagged)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from turgor.fem.elements import TRI6
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes, pack_symmetric
+from turgor.fem.term import Unlagged, add_at_nodes, pack_symmetric
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -52,7 +52,7 @@ class ElasticSupport:
 Support = Clamped | Sliding | Prescribed | ElasticSupport
 
 
-class SpringBed:
+class SpringBed(Unlagged):
     """½ k ∫ |u|² dA, or ½ k ∫ (u · N)² dA, over a reference surface with normal N.
 
     Parameters
@@ -86,9 +86,9 @@ class SpringBed:
         local = state.u[self.nodes].reshape(len(self.nodes), 18, 1)
         add_at_nodes(self.nodes, (self._blocks @ local).reshape(-1, 6, 3), out)
 
-    def stiffness(self, state: State, out: Floats) -> None:
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the springs' stiffness, N/mm."""
-        del state
+        del state, lagged
         pack_symmetric(self._blocks, out)
 
 

@@ -82,7 +82,7 @@ class System:
 
     def reference_state(self) -> State:
         """Return the undeformed state without loads."""
-        return State(np.zeros_like(self.mesh.points), np.ones(self.mesh.n_cells), np.zeros(len(self.loads)))
+        return self.consistent(np.zeros_like(self.mesh.points), np.zeros(len(self.loads)))
 
     def loads_at(self, fraction: float) -> Floats:
         """Return the loads ``(n_loads,)`` at a load fraction: weight in full, the others in proportion."""
@@ -135,7 +135,7 @@ class System:
         for k, term in enumerate(self.terms):
             block = self._block(k)
             if block.size:
-                term.stiffness(state, block)
+                term.stiffness(state, state.lagged[k], block)
                 self._frames.turn(k, block)
         self.pattern.sum_blocks(self._packed, self._values)
         return self._values
@@ -159,25 +159,27 @@ class System:
         field[self.pattern.free] = free
         return self.constraints.from_frames(field.reshape(-1, 3))
 
-    def updated_dilatation(self, state: State, du: Floats) -> Floats:
-        """Return every element's dilatation after Newton's step `du`, linearised at `state`, ``(n_cells,)``."""
-        dilatation = state.dilatation.copy()
-        for solid in self.solids:
-            dilatation[solid.index] = solid.updated_dilatation(state, du)
-        return dilatation
+    def consistent(self, u: Floats, loads: Floats) -> State:
+        """Return the state of displacement `u` in which nothing lags."""
+        return State(u, tuple(term.lagged_at(u) for term in self.terms), loads)
 
-    def dilatation(self, u: Floats) -> Floats:
-        """Return every element's ratio of deformed to reference volume, ``(n_cells,)``."""
-        dilatation = np.ones(self.mesh.n_cells)
-        for solid in self.solids:
-            dilatation[solid.index] = solid.dilatation(u)
+    def advanced(self, state: State, du: Floats) -> State:
+        """Return the state after Newton's step `du`, what lags updated as the step predicts."""
+        lagged = tuple(term.lagged_after(state, du) for term in self.terms)
+        return State(state.u + du, lagged, state.loads)
+
+    def dilatation(self, state: State) -> Floats:
+        """Return the lagged dilatation of every element, at an equilibrium its ratio of volumes, ``(n_cells,)``."""
+        dilatation = np.empty(self.mesh.n_cells)
+        for solid, values in zip(self.solids, state.lagged, strict=False):
+            dilatation[solid.index] = values
         return dilatation
 
     def element_pressure(self, state: State) -> Floats:
         """Return U'(θ) of every element, ``(n_cells,)``, MPa: its mean stress, positive in tension."""
         pressure = np.empty(self.mesh.n_cells)
-        for solid in self.solids:
-            pressure[solid.index] = solid.material.volumetric.pressure(state.dilatation[solid.index])
+        for solid, values in zip(self.solids, state.lagged, strict=False):
+            pressure[solid.index] = solid.material.volumetric.pressure(values)
         return pressure
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:

@@ -18,6 +18,11 @@ class Term(Protocol):
 
     ``nodes (n_blocks, nodes_per_block)`` are the blocks of nodes that the stiffness couples; a term that is linear in
     the displacement has none.
+
+    A term whose force is stiff in few quantities (a volume, a fibre's length, a gap) may treat these as unknowns of
+    their own: its stiffness then takes its geometric part from their lagged values, which Newton's step updates as if
+    they were linear in the displacement. The force never depends on them. Eliminating them from Newton's
+    method on the mixed problem gives the same iteration.
     """
 
     nodes: Ints
@@ -30,9 +35,31 @@ class Term(Protocol):
         """Add the derivative of the energy with respect to the displacement to ``out (n_points, 3)``, N."""
         ...
 
-    def stiffness(self, state: State, out: Floats) -> None:
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the packed upper triangles of the block stiffnesses, ``out (n_blocks, packed)``, N/mm."""
         ...
+
+    def lagged_at(self, u: Floats) -> Floats:
+        """Return the lagged quantities that belong to the displacement `u`."""
+        ...
+
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return the lagged quantities after the step `du`, linearised at the state."""
+        ...
+
+
+class Unlagged:
+    """A term of which nothing lags behind the displacement."""
+
+    def lagged_at(self, u: Floats) -> Floats:
+        """Return nothing."""
+        del u
+        return NOTHING
+
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return nothing."""
+        del state, du
+        return NOTHING
 
 
 class Loaded(Protocol):
@@ -49,6 +76,7 @@ class Loaded(Protocol):
         ...
 
 
+NOTHING = np.empty(0)
 NO_NODES = np.empty((0, 1), np.int32)
 
 

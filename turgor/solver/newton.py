@@ -1,4 +1,4 @@
-"""Newton's method with the element dilatations as unknowns of their own."""
+"""Newton's method in which the stiff quantities (element volumes) are unknowns of their own."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Equilibrium:
     Attributes
     ----------
     state
-        The state; its dilatations are those of its displacement.
+        The state; nothing in it lags.
     fraction
         The load fraction.
     residuals
@@ -110,7 +110,7 @@ def find_equilibrium(
     """Find the equilibrium at a load fraction, or at a given volume, from a guess.
 
     Each iteration solves with the tangent whose geometric part takes the pressures that the previous one predicted
-    (``State.dilatation``), while the right-hand side is the exact out-of-balance force. Eliminating the
+    (``State.lagged``), while the right-hand side is the exact out-of-balance force. Eliminating the
     pressures from Newton's method on the mixed problem gives the same iteration, so that it needs no
     more steps at a bulk modulus of 1e5 μ than at μ.
 
@@ -136,7 +136,7 @@ def find_equilibrium(
     NotConvergedError
         With the residual history and the worst element, if no equilibrium is reached.
     """
-    state = guess.with_(loads=system.loads_at(fraction))
+    state = guess.with_loads(system.loads_at(fraction))
     pending = system.constraints.imposed(state.u, fraction) - state.u
     moving = bool(np.any(pending))
     # Where all forces are tiny, rounding is not to be mistaken for imbalance.
@@ -177,7 +177,7 @@ def find_equilibrium(
             du += change * response
         state, damping = _advanced(system, state, du, residuals)
         fraction += damping * change
-        state = state.with_(loads=system.loads_at(fraction))
+        state = state.with_loads(system.loads_at(fraction))
 
 
 def _advanced(system: System, state: State, du: Floats, residuals: list[float]) -> tuple[State, float]:
@@ -185,12 +185,11 @@ def _advanced(system: System, state: State, du: Floats, residuals: list[float]) 
     damping = 1.0
     while damping >= SMALLEST_DAMPING:
         step = damping * du
-        trial = state.u + step
-        worst, _ = system.worst_jacobian(trial)
+        worst, _ = system.worst_jacobian(state.u + step)
         if worst > 0.0:
-            return state.with_(u=trial, dilatation=system.updated_dilatation(state, step)), damping
+            return system.advanced(state, step), damping
         damping *= 0.5
-    raise _failure("an element would turn inside out", system, state.with_(u=state.u + du), residuals)
+    raise _failure("an element would turn inside out", system, system.consistent(state.u + du, state.loads), residuals)
 
 
 def _accepted(
@@ -201,7 +200,7 @@ def _accepted(
     residuals: list[float],
     compliance: float | None,
 ) -> Equilibrium:
-    state = state.with_(dilatation=system.dilatation(state.u))
+    state = system.consistent(state.u, state.loads)
     factorisations = len(residuals) - 1
     if factorisations == 0 or residuals[-2] > NEAR:
         linear.factorise(system.stiffness(state))

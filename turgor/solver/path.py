@@ -266,11 +266,8 @@ class _Walk:
             return here.state
         reach = (aim - here.fraction) / (here.fraction - self.before.fraction)
         reach = min(reach, 2.0)
-        u = here.state.u + reach * (here.state.u - self.before.state.u)
-        if self.system.worst_jacobian(u)[0] <= 0.0:
-            return here.state
-        dilatation = here.state.dilatation + reach * (here.state.dilatation - self.before.state.dilatation)
-        return here.state.with_(u=u, dilatation=dilatation)
+        predicted = here.state.beyond(self.before.state, reach)
+        return predicted if self.system.worst_jacobian(predicted.u)[0] > 0.0 else here.state
 
     def _stopped(self, error: NotConvergedError) -> StoppedShortError:
         facts = self._facts()

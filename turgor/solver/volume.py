@@ -96,10 +96,9 @@ class VolumeWalk:
         if before is not None:
             last = self.system.conjugate(here.state)
             reach = (conjugate - last) / (last - self.system.conjugate(before.state))
-            u = guess.u + reach * (guess.u - before.state.u)
-            if self.system.worst_jacobian(u)[0] > 0.0:
-                dilatation = guess.dilatation + reach * (guess.dilatation - before.state.dilatation)
-                guess = replace(guess, u=u, dilatation=dilatation)
+            predicted = here.state.beyond(before.state, reach)
+            if self.system.worst_jacobian(predicted.u)[0] > 0.0:
+                guess = predicted
                 fraction += reach * (here.fraction - before.fraction)
         return find_equilibrium(self.system, self.linear, guess, fraction, self.options, conjugate=conjugate)
 

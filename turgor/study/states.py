@@ -7,7 +7,6 @@ import time
 import numpy as np
 
 from turgor.fem.fields import von_mises
-from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.results.record import StepRecord
 from turgor.solver.newton import Equilibrium
@@ -35,7 +34,7 @@ def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: floa
         loads={name: float(value) for name, value in zip(system.load_names, state.loads, strict=True)},
         displacement=state.u,
         element_pressure=system.element_pressure(state),
-        element_dilatation=state.dilatation,
+        element_dilatation=system.dilatation(state),
         von_mises=stress.nodal,
         von_mises_max=stress.largest,
         von_mises_p99=stress.percentile_99,
@@ -81,11 +80,8 @@ class Recorder:
 
 def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     """Return the equilibrium that a record was made of, as a start for the solver."""
-    state = State(
-        np.array(record.displacement),
-        np.array(record.element_dilatation),
-        np.array([record.loads[name] for name in system.load_names]),
-    )
+    loads = np.array([record.loads[name] for name in system.load_names])
+    state = system.consistent(np.array(record.displacement), loads)
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)
