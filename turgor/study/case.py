@@ -112,7 +112,7 @@ class Case(StrictModel):
     Made from a file by :func:`load_case`. Quantities are kept in internal units and written back with them.
     """
 
-    name: str = Field(description="the run's name, and its folder where none is given")
+    name: str = Field(default="case", description="the run's name and default folder; left out, the file's name")
     geometry: Geometry
     materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
     mesh: MeshCase = MeshCase()

@@ -63,6 +63,13 @@ for _tag, _pattern, _first in _CORE_RESOLVERS:
     _CaseLoader.add_implicit_resolver(_tag, re.compile(rf"^(?:{_pattern})$"), _starts)
 
 
+def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    return int(loader.construct_scalar(node))  # PyYAML would read 010 as octal
+
+
+_CaseLoader.add_constructor("tag:yaml.org,2002:int", _integer)
+
+
 class _RefusedError(Exception):
     """Well-formed YAML that a case file may not hold."""
 

@@ -135,12 +135,12 @@ class _Running:
             system = system_of(self.case, mesh, materials)
             # Nothing is written before everything that can be checked has been.
             with stored or self._created(mesh) as store:
-                self.run_log.write_to(self.folder / "run.log")
+                self.run_log.write_to(self.folder / "run.log", append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
                 if fit:
                     store.write_fit(fit_document(fit))
-                reason = self._walk(system, store)
-                summary = self._summary(system, store, reason)
+                stop = self._walk(system, store)
+                summary = self._summary(system, store, stop)
                 store.finish(summary)
         self.show.stage("report")
         report(self.folder)
@@ -168,8 +168,8 @@ class _Running:
         log.info("resuming behind step %d", store.n_steps)
         return store
 
-    def _walk(self, system: System, store: RunStore) -> str | None:
-        """Follow the load path; return why it stopped short, or ``None`` if it reached the end."""
+    def _walk(self, system: System, store: RunStore) -> SolverError | None:
+        """Follow the load path; return what stopped it short, or ``None`` if it reached the end."""
         fractions = self.case.fractions()
         last = store.last()
         start = to_equilibrium(system, last) if last else None
@@ -188,7 +188,7 @@ class _Running:
             )
         except SolverError as error:
             log.error("%s %s", error, error.facts)
-            return str(error)
+            return error
         except KeyboardInterrupt:
             log.warning("interrupted")
             raise KeyboardInterrupt(
@@ -207,16 +207,17 @@ class _Running:
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
 
-    def _summary(self, system: System, store: RunStore, reason: str | None) -> Summary:
-        return summarise(
+    def _summary(self, system: System, store: RunStore, stop: SolverError | None) -> Summary:
+        summary = summarise(
             store.history,
             store.mesh,
-            converged=reason is None,
-            reason=reason or "the full load was reached",
+            converged=stop is None,
+            reason=str(stop) if stop else "the full load was reached",
             dofs=system.n_dofs,
             wall_s=time.perf_counter() - self.begun,
             peak_memory_mb=peak_memory_mb(),
         )
+        return summary | {"facts": stop.facts} if stop else summary
 
 
 def _load_text(name: str, value: float) -> str:

@@ -30,9 +30,9 @@ class RunLog:
         self._logger.addHandler(self._memory)
         return self
 
-    def write_to(self, path: Path) -> None:
-        """Append everything so far, and from now on, to the file `path`."""
-        self._file = logging.FileHandler(path, encoding="utf-8")
+    def write_to(self, path: Path, *, append: bool) -> None:
+        """Write everything so far, and from now on, to the file `path`, behind what is there or instead of it."""
+        self._file = logging.FileHandler(path, mode="a" if append else "w", encoding="utf-8")
         self._file.setFormatter(logging.Formatter(_FORMAT))
         self._memory.setTarget(self._file)
         self._memory.flush()

@@ -1,0 +1,183 @@
+"""What the commands print, where they print it, and how they end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from typer.testing import CliRunner, Result
+
+import turgor as tg
+from turgor.cli import app
+from turgor.common.errors import MissingPackageError
+
+SMALL = Path(__file__).parents[1] / "study" / "small.yaml"
+GOOD_TEST = Path(__file__).parent / "bad" / "good.csv"
+
+
+def turgor(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def printed(*arguments: object) -> Any:
+    """Return the JSON that a command prints; nothing else may stand on standard output."""
+    result = turgor(*arguments)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def test_version() -> None:
+    assert turgor("--version").stdout == f"turgor {tg.__version__}\n"
+
+
+def test_help_lists_the_commands() -> None:
+    result = turgor("--help")
+    assert result.exit_code == 0
+    for command in ("run", "fit", "materials", "templates", "mesh", "schema", "doctor"):
+        assert f"\n  {command} " in result.stdout
+        assert turgor(command, "--help").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["runn"], "No such command 'runn'"),
+        (["run"], "Missing argument"),
+        (["run", "a.yaml", "--nothing"], "No such option"),
+        (["run", "a.yaml", "b.yaml"], "unexpected extra argument"),
+        (["fit", "--strain-range"], "--strain-range"),
+        (["materials", "unobtainium"], "unobtainium"),
+        (["templates", "tubes"], "tubes"),
+        (["fit", "nowhere.csv"], "nowhere.csv"),
+    ],
+)
+def test_a_wrong_command_line_ends_with_2(arguments: list[str], words: str) -> None:
+    result = turgor(*arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stdout == ""
+    assert "Traceback" not in result.output
+
+
+def test_run_prints_its_summary_and_nothing_else(tmp_path: Path) -> None:
+    summary = printed("run", SMALL, "--out", tmp_path / "run", "--json", "--set", "solver.steps=1")
+    assert summary == json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["converged"] is True
+
+
+def test_run_tells_its_steps_on_standard_error(tmp_path: Path) -> None:
+    result = turgor("run", SMALL, "--out", tmp_path / "run", "--set", "solver.steps=2")
+    assert result.exit_code == 0
+    assert "50.0 %  10 kPa in cavity" in result.stderr
+    assert "100.0 %  20 kPa in cavity" in result.stderr
+    assert "kPa in cavity" not in result.stdout
+    assert "max_displacement_mm" in result.stdout
+
+
+def test_a_run_that_stops_short_ends_with_3(tmp_path: Path) -> None:
+    result = turgor("run", SMALL, "--out", tmp_path / "run", "--json", "--set", "loads.0.value=500 kPa")
+    assert result.exit_code == 3
+    summary = json.loads(result.stdout)
+    assert summary["converged"] is False
+    assert f"turgor: stopped short of the full load: {summary['reason']}\n" in result.stderr
+    assert "kPa in cavity" in summary["reason"]
+
+
+def test_an_interrupt_ends_with_130_and_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("turgor.study.run.solve_path", interrupted)
+    result = turgor("run", SMALL, "--out", tmp_path / "run")
+    assert result.exit_code == 130
+    assert "turgor: interrupted; 0 finished steps" in result.stderr
+    assert "--resume" in result.stderr
+
+
+def test_an_unexpected_failure_leaves_one_line_and_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object, **options: object) -> None:
+        raise ZeroDivisionError("a flaw\nin two lines")
+
+    monkeypatch.setattr("turgor.study.run.solve_path", broken)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    result = turgor("run", SMALL, "--out", tmp_path / "run")
+    assert result.exit_code == 1
+    assert "Traceback" not in result.output
+    assert "turgor: unexpected ZeroDivisionError: a flaw in two lines; please report it with" in result.stderr
+    (log,) = tmp_path.glob("turgor-*.log")
+    assert "Traceback" in log.read_text(encoding="utf-8")
+
+
+def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(*arguments: object, **options: object) -> None:
+        raise MissingPackageError("libGLU.so.1 is missing; on Debian or Ubuntu: apt-get install libglu1-mesa")
+
+    monkeypatch.setattr("turgor.study.run.generate", absent)
+    result = turgor("run", SMALL, "--out", tmp_path / "run")
+    assert result.exit_code == 2
+    assert "apt-get install libglu1-mesa" in result.stderr
+
+
+def test_fit_prints_what_was_promised(tmp_path: Path) -> None:
+    found = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--model", "mooney-rivlin-2", "--json")
+    assert {entry["model"] for entry in found["fits"]} == {"yeoh-1", "mooney-rivlin-2"}
+    assert found["recommended"] in {"yeoh-1", "mooney-rivlin-2"}
+    for key in ("parameters", "units", "rmse_MPa", "residual_norm_MPa", "r2", "stable"):
+        assert key in found["fits"][0]
+    assert found["data"]
+
+
+def test_a_written_material_fits_into_a_case(tmp_path: Path) -> None:
+    result = turgor("fit", GOOD_TEST, "--model", "yeoh-1", "--out", tmp_path / "m.yaml", "--report", tmp_path / "fit")
+    assert result.exit_code == 0
+    assert "yeoh-1" in result.stdout
+    material = yaml.safe_load((tmp_path / "m.yaml").read_text(encoding="utf-8"))
+    case = tg.load_case(SMALL, [f"materials.body={json.dumps(material)}"])
+    assert case.materials["body"].build().shear_modulus == pytest.approx(0.1, rel=1e-3)
+    assert "yeoh-1" in (tmp_path / "fit" / "fit.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))["recommended"] == "yeoh-1"
+
+
+def test_materials() -> None:
+    names = [entry["name"] for entry in printed("materials", "--json")]
+    assert len(names) > 20
+    assert printed("materials", names[0], "--json")["name"] == names[0]
+    assert names[0] in turgor("materials").stdout
+    assert "constants" in turgor("materials", names[0]).stdout
+
+
+def test_templates() -> None:
+    described = {entry["template"]: entry for entry in printed("templates", "--json")}
+    assert {"tube", "pneunet"} <= set(described)
+    assert printed("templates", "tube", "--json") == described["tube"]
+    assert "inner_radius" in turgor("templates", "tube").stdout
+    assert "pneunet" in turgor("templates").stdout
+
+
+def test_mesh_writes_the_mesh_it_describes(tmp_path: Path) -> None:
+    facts = printed("mesh", SMALL, "--out", tmp_path / "tube.msh", "--json")
+    assert facts["regions"] == {"body": facts["elements"]}
+    assert (tmp_path / "tube.msh").stat().st_size > 10_000
+    assert turgor("mesh", SMALL, "--out", tmp_path / "tube.stl").exit_code == 2
+
+
+def test_the_schema_is_one_of_case_files() -> None:
+    assert set(printed("schema")["properties"]) == set(tg.Case.model_fields)
+
+
+def test_doctor_tells_what_it_stands_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = printed("doctor", "--json")
+    assert found["versions"]["turgor"] == tg.__version__
+    assert found["linear_solver"] in {"MKL PARDISO", "SuperLU"}
+    assert found["threads"]["kernels"] >= 1
+    assert found["missing"] == []
+    assert "linear_solver" in turgor("doctor").stdout
+
+    def absent(name: str) -> None:
+        raise MissingPackageError(f"{name} needs libGL.so.1; on Debian or Ubuntu: apt-get install libgl1")
+
+    monkeypatch.setattr("turgor.study.environment.require", absent)
+    assert "apt-get install libgl1" in turgor("doctor").stderr

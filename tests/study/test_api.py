@@ -1,0 +1,105 @@
+"""The Python story of the README."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import turgor as tg
+from turgor.common.errors import InputError, SolverError
+from turgor.results.store import RunStore
+from turgor.study.case import load_case
+from turgor.study.run import run
+
+
+@pytest.fixture(scope="module")
+def mesh() -> tg.Mesh:
+    return tg.CappedTube(inner_radius="6 mm", wall="3 mm", length="40 mm", cap="6 mm").mesh(size="6 mm")
+
+
+@pytest.fixture(scope="module")
+def path(mesh: tg.Mesh) -> tg.Path:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    return tg.Model(mesh, body=rubber).inflate("20 kPa", steps=4)
+
+
+def test_the_story_and_the_case_file_tell_the_same(
+    path: tg.Path, small_tube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
+    done = run(load_case(small_tube), tmp_path / "run")
+    stored = RunStore.open(done.folder)
+    assert np.array_equal(path.records[-1].displacement, stored.load(3).displacement)
+    assert path.summary["final"] == done.summary["final"]
+
+
+def test_series_have_units(path: tg.Path) -> None:
+    assert path.pressure.to("kPa").magnitude == pytest.approx([5.0, 10.0, 15.0, 20.0])
+    assert path.tip_displacement.shape == (4, 3)
+    assert np.all(np.diff(path.tip_displacement.to("mm").magnitude[:, 2]) > 0)
+    assert np.all(np.abs(path.bending_angle.to("deg").magnitude) < 1.0)
+    assert path.cavity_volume.to("ml").magnitude[0] == pytest.approx(np.pi * 6**2 * 28 / 1000, rel=0.1)
+    assert path.stable is not False
+    with pytest.raises(InputError, match=r"no such series.*expected 'twist'"):
+        path.series("twits")
+
+
+def test_the_path_makes_a_report(path: tg.Path, tmp_path: Path) -> None:
+    report = path.report(tmp_path / "finger")
+    text = report.read_text(encoding="utf-8")
+    assert report.name == "report.html"
+    assert "neo-hookean" in text
+    assert RunStore.open(tmp_path / "finger").n_steps == 4
+    with pytest.raises(InputError, match="holds a run already"):
+        path.report(tmp_path / "finger")
+
+
+def test_every_cavity_and_other_loads_act(mesh: tg.Mesh) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499, density="1070 kg/m^3")
+    model = tg.Model(mesh, body=rubber, loads=[{"type": "gravity", "direction": [0, 0, 1]}])
+    reached: list[int] = []
+    heavy = model.inflate("1 kPa", steps=1, on_step=lambda path: reached.append(len(path.records)))
+    assert reached == [1, 2]  # the weight alone comes first
+    assert heavy.records[0].fraction == 0.0
+    assert heavy.tip_displacement.magnitude[0, 2] > 0
+    assert set(heavy.records[-1].loads) == {"pressure:cavity", "gravity"}
+
+
+def test_contact_is_refused_with_its_reason(mesh: tg.Mesh) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
+    with pytest.raises(InputError, match="contact is not part of this version"):
+        tg.Model(mesh, body=rubber, contact=True)
+
+
+def test_what_the_mesh_does_not_have_is_refused(mesh: tg.Mesh) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
+    with pytest.raises(InputError, match=r"materials.bodi: the actuator has no such region.*'body'"):
+        tg.Model(mesh, bodi=rubber)
+    with pytest.raises(InputError, match=r"no material is given for the region 'body'"):
+        tg.Model(mesh)
+    with pytest.raises(InputError, match="cavity-9"):
+        tg.Model(mesh, body=rubber).inflate("1 kPa", cavity="cavity-9")
+    with pytest.raises(InputError, match="pressure: a unit is missing"):
+        tg.Model(mesh, body=rubber).inflate(3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="steps"):
+        tg.Model(mesh, body=rubber).inflate("1 kPa", steps=0)
+    with pytest.raises(InputError, match="size: a unit is missing"):
+        tg.CappedTube().mesh(size=3)  # type: ignore[arg-type]
+
+
+def test_regions_without_a_material_are_made_of_the_body() -> None:
+    mesh = tg.PneuNet(chambers=1, symmetric=True).mesh(size="4 mm")
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
+    model = tg.Model(mesh, body=rubber)
+    assert dict.fromkeys(mesh.regions, rubber) == model.materials
+    assert [held.surface for held in model.supports] == ["mount", "symmetry"]
+
+
+def test_a_path_beyond_the_limit_raises_with_facts(mesh: tg.Mesh) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    kept: list[tg.Path] = []
+    with pytest.raises(SolverError, match="kPa in cavity") as stop:
+        tg.Model(mesh, body=rubber).inflate("500 kPa", steps=20, on_step=kept.append)
+    assert stop.value.facts["pressure:cavity_kPa"] == pytest.approx(kept[-1].pressure.magnitude[-1])

@@ -1,0 +1,140 @@
+"""Case files: what they mean, how they are changed, and that the resolved one means the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from turgor.common.errors import InputError
+from turgor.common.units import to_internal
+from turgor.materials import create
+from turgor.study.boundary import read_loads, read_supports
+from turgor.study.build import check_sizes
+from turgor.study.case import Case, load_case
+from turgor.study.materials import build_materials
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+
+
+def test_quantities_are_kept_in_internal_units(small_tube: Path) -> None:
+    case = load_case(small_tube, ["loads.0.value=1 bar", "mesh.size=0.25 in"])
+    assert case.full_pressure == pytest.approx(0.1, rel=1e-12)
+    assert case.mesh.size == pytest.approx(6.35, rel=1e-12)
+
+
+def test_the_name_comes_from_the_file(small_tube: Path) -> None:
+    odd = small_tube.rename(small_tube.with_name("1 tube (new).yaml"))
+    assert load_case(odd).name == "1-tube--new"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_the_resolved_case_of_an_example_is_the_same_case(path: Path, tmp_path: Path) -> None:
+    case = load_case(path)
+    resolved = tmp_path / "case.yaml"
+    resolved.write_text(case.to_yaml(), encoding="utf-8")
+    again = load_case(resolved)
+    assert again == case
+    assert again.to_yaml() == case.to_yaml()
+
+
+AWKWARD = """\
+name: awkward
+geometry: {template: tube, wall: 0.1 in, cap: 0.7 inch}
+materials:
+  body: {model: ogden-2, constants: {mu1: 9.11e-4 MPa, alpha1: 5.88, mu2: 9.79 psi, alpha2: 1.45},
+         D1: 3e-2 1/kPa, density: 1.07 g/cm^3, convention: abaqus}
+supports:
+  - {type: displacement, surface: mount, x: 0 mm, y: 1 thou}
+  - {type: elastic, surface: outer, stiffness: 0.1 kPa/mm, normal_only: true}
+loads:
+  - {type: pressure, value: 1.1 psi}
+  - {type: gravity, direction: [1, 2, 3]}
+  - {type: traction, surface: tip-face, value: 0.3 kPa, direction: [0, 1, 1]}
+  - {type: force, surface: tip-face, value: 0.1 gram_force, direction: [0, 0, -2]}
+solver: {outputs: [0.1 psi, 0.7 psi, 1.1 psi]}
+measures: [twist]
+"""
+
+
+def test_no_digit_is_lost_in_the_resolved_case(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    first.write_text(AWKWARD.replace("3e-2 1/kPa", "3e-2 kPa^-1"), encoding="utf-8")
+    case = load_case(first)
+    second.write_text(case.to_yaml(), encoding="utf-8")
+    assert load_case(second) == case
+    assert load_case(second).fractions() == case.fractions()
+    assert [load.build() for load in load_case(second).loads] == [load.build() for load in case.loads]
+
+
+def test_outputs_are_fractions_of_the_pressure(small_tube: Path) -> None:
+    assert load_case(small_tube).fractions() == (0.25, 0.5, 0.75, 1.0)
+    case = load_case(small_tube, ["solver={outputs: [5 kPa, 0.2 bar]}"])
+    assert case.fractions() == pytest.approx((0.25, 1.0))
+    assert case.fractions()[-1] == 1.0
+    vacuum = load_case(small_tube, ["loads.0.value=-10 kPa", "solver={outputs: [-1 kPa, -10 kPa]}"])
+    assert vacuum.fractions() == pytest.approx((0.1, 1.0))
+
+
+def test_direction_and_size_make_a_vector() -> None:
+    (gravity,) = read_loads([{"type": "gravity", "direction": [0, 3, -4]}])
+    assert gravity.build().acceleration == pytest.approx((0.0, 0.6 * 9806.65, -0.8 * 9806.65))
+    (force,) = read_loads([{"type": "force", "surface": "tip-face", "value": "2 N", "direction": [0, 0, 5]}])
+    assert force.build().vector == (0.0, 0.0, 2.0)
+
+
+def test_items_of_the_python_story_are_checked_as_in_a_file() -> None:
+    with pytest.raises(InputError, match=r"supports.0.surfac: unknown key; expected 'surface'"):
+        read_supports([{"type": "clamped", "surfac": "mount"}])
+    with pytest.raises(InputError, match=r"loads.0.value: a unit is missing"):
+        read_loads([{"type": "pressure", "value": 3}])
+
+
+def test_materials_take_their_volume_change_and_density(small_tube: Path) -> None:
+    case = load_case(
+        small_tube, ["materials.body={model: yeoh-1, constants: {C10: 50 kPa}, poisson: 0.45, density: 1 g/cm^3}"]
+    )
+    materials, fit = build_materials(case.materials)
+    assert fit is None
+    assert materials["body"].poisson_ratio == pytest.approx(0.45)
+    assert materials["body"].density == pytest.approx(1e-9)
+    assert materials["body"].shear_modulus == pytest.approx(0.1)
+
+
+def test_the_library_material_can_be_given_a_density(small_tube: Path) -> None:
+    change = "materials.body={library: ecoflex-00-30-yeoh, density: 2 g/cm^3}"
+    materials, _ = build_materials(load_case(small_tube, [change]).materials)
+    assert materials["body"].density == pytest.approx(2e-9)
+    assert materials["body"].parameters["C10"] == pytest.approx(0.007734)
+
+
+@pytest.mark.parametrize(
+    ("value", "refused"), [("9.9 MPa", False), ("10.1 MPa", True), ("-0.1 MPa", False), ("-0.11 MPa", True)]
+)
+def test_the_bounds_of_a_pressure(small_tube: Path, value: str, refused: bool) -> None:
+    case = load_case(small_tube, [f"loads.0.value={value}"])
+    materials = {"body": create("neo-hookean", {"C10": 0.05})}
+    if refused:
+        with pytest.raises(InputError, match=r"loads.0.value"):
+            check_sizes(case, materials)
+    else:
+        check_sizes(case, materials)
+
+
+def test_the_schema_names_every_key_and_template() -> None:
+    schema = Case.model_json_schema()
+    assert set(schema["properties"]) == set(Case.model_fields)
+    assert set(schema["required"]) == {"geometry", "materials", "supports", "loads"}
+    names = {entry["properties"]["template"]["const"] for entry in schema["properties"]["geometry"]["oneOf"]}
+    assert {"tube", "pneunet"} <= names
+    assert json.loads(json.dumps(schema)) == schema
+
+
+def test_a_quantity_of_the_examples_means_what_it_says() -> None:
+    case = load_case(next(path for path in EXAMPLES if path.stem == "tube"))
+    materials, _ = build_materials(case.materials)
+    assert materials["body"].shear_modulus == pytest.approx(0.1047)
+    assert materials["body"].bulk_modulus == pytest.approx(1000 * 0.1047)
+    assert case.full_pressure == to_internal("0.03 MPa", "pressure")
+    assert case.geometry.default_size == pytest.approx(3.5)

@@ -1,0 +1,44 @@
+"""``docs/cases.md`` shows a case that loads and names every key there is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from turgor.study.boundary import DisplacementCase, ElasticCase, ForceCase, GravityCase, PressureCase, TractionCase
+from turgor.study.case import Case, SolverCase, load_case
+from turgor.study.materials import FittedMaterial, LibraryMaterial, ModelMaterial
+
+TEXT = (Path(__file__).parents[2] / "docs" / "cases.md").read_text(encoding="utf-8")
+
+
+def test_the_case_of_the_page_loads(tmp_path: Path) -> None:
+    match = re.search(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
+    assert match is not None
+    (tmp_path / "page.yaml").write_text(match[1], encoding="utf-8")
+    case = load_case(tmp_path / "page.yaml")
+    assert case.full_pressure == pytest.approx(0.03)
+    assert case.mesh.size == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        Case,
+        SolverCase,
+        LibraryMaterial,
+        ModelMaterial,
+        FittedMaterial,
+        DisplacementCase,
+        ElasticCase,
+        PressureCase,
+        GravityCase,
+        TractionCase,
+        ForceCase,
+    ],
+)
+def test_every_key_is_on_the_page(part: type[Case]) -> None:
+    for key in part.model_fields:
+        assert re.search(rf"`(?:[\w.]*\.)?{key}\b", TEXT), key

@@ -1,0 +1,188 @@
+"""A run keeps every finished step, can be resumed, and says what it came to."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from turgor.common.errors import InputError
+from turgor.results.store import RunStore
+from turgor.study.case import load_case
+from turgor.study.run import Run, run
+
+
+class Watch:
+    """A progress that remembers, and can interrupt after a number of steps as Ctrl-C would."""
+
+    def __init__(self, interrupt_after: int | None = None) -> None:
+        self.stages: list[str] = []
+        self.fractions: list[float] = []
+        self.interrupt_after = interrupt_after
+
+    def stage(self, name: str) -> None:
+        self.stages.append(name)
+
+    def note(self, text: str) -> None:
+        if self.interrupt_after is not None and len(self.fractions) >= self.interrupt_after:
+            raise KeyboardInterrupt
+
+    def advance(self, fraction: float, text: str) -> None:
+        self.fractions.append(fraction)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run of the small tube that nobody disturbs."""
+    folder = tmp_path_factory.mktemp("whole")
+    case = folder / "small.yaml"
+    case.write_text(small_tube_text(), encoding="utf-8")
+    return run(load_case(case), folder / "run")
+
+
+@pytest.fixture
+def unreported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the report out: its pictures take longer than the solver, and ``whole`` has one."""
+    monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
+
+
+def small_tube_text() -> str:
+    return (Path(__file__).parent / "small.yaml").read_text(encoding="utf-8")
+
+
+def displacements(folder: Path) -> np.ndarray:
+    return np.array([record.displacement for record in RunStore.open(folder).records()])
+
+
+def test_the_folder_holds_what_was_promised(whole: Run) -> None:
+    names = {path.name for path in whole.folder.iterdir()}
+    assert {"summary.json", "history.csv", "result.pvd", "report.html", "case.yaml", "run.log"} <= names
+    summary = json.loads((whole.folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["converged"] is True
+    assert summary["final"]["pressure_kPa"] == pytest.approx(20.0)
+    assert len(summary["final"]["tip_displacement_mm"]) == 3
+    assert summary["final"]["tip_displacement_mm"][2] > 0.05
+    assert summary["mesh"]["dofs"] < 3 * summary["mesh"]["nodes"]
+    assert summary["solver"]["steps"] == 4
+    assert summary["solver"]["stable"] is not False
+    assert summary["solver"]["peak_memory_MB"] > 10
+    with (whole.folder / "history.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["pressure_kPa"]) for row in rows] == pytest.approx([5.0, 10.0, 15.0, 20.0])
+    assert "linear solver" in (whole.folder / "run.log").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unreported")
+def test_the_resolved_case_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
+    again = run(load_case(whole.folder / "case.yaml"), tmp_path / "again")
+    assert np.array_equal(displacements(again.folder), displacements(whole.folder))
+    assert (again.folder / "case.yaml").read_bytes() == (whole.folder / "case.yaml").read_bytes()
+
+
+@pytest.mark.usefixtures("unreported")
+def test_an_interrupted_run_keeps_its_steps_and_is_resumed(whole: Run, small_tube: Path, tmp_path: Path) -> None:
+    folder, case = tmp_path / "run", load_case(small_tube)
+    with pytest.raises(KeyboardInterrupt, match=r"2 finished steps .* --resume"):
+        run(case, folder, progress=Watch(interrupt_after=2))
+    assert RunStore.open(folder).n_steps == 2
+    assert not (folder / "summary.json").exists()
+    watch = Watch()
+    resumed = run(case, folder, resume=True, progress=watch)
+    assert resumed.converged
+    assert watch.fractions == [0.75, 1.0]
+    assert "mesh" not in watch.stages
+    assert displacements(folder) == pytest.approx(displacements(whole.folder), abs=1e-5)
+    assert "resuming behind step 2" in (folder / "run.log").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unreported")
+def test_a_finished_run_is_resumed_without_a_step(whole: Run) -> None:
+    before = displacements(whole.folder)
+    watch = Watch()
+    assert run(load_case(whole.folder / "case.yaml"), whole.folder, resume=True, progress=watch).converged
+    assert watch.fractions == []
+    assert np.array_equal(displacements(whole.folder), before)
+
+
+def test_a_run_of_another_case_is_not_resumed(whole: Run) -> None:
+    other = load_case(whole.folder / "case.yaml", ["loads.0.value=19 kPa"])
+    with pytest.raises(InputError, match="one of another case"):
+        run(other, whole.folder, resume=True)
+
+
+def test_a_run_is_not_overwritten_unasked(whole: Run) -> None:
+    with pytest.raises(InputError, match=r"holds a run already.*--overwrite"):
+        run(load_case(whole.folder / "case.yaml"), whole.folder)
+
+
+@pytest.mark.usefixtures("unreported")
+def test_to_resume_where_nothing_was_stored_is_to_begin(small_tube: Path, tmp_path: Path) -> None:
+    case = load_case(small_tube, ["solver.steps=1"])
+    assert run(case, tmp_path / "run", resume=True).converged
+
+
+def test_a_run_that_stops_short_keeps_what_it_reached(small_tube: Path, tmp_path: Path) -> None:
+    changes = ["loads.0.value=500 kPa", "solver.steps=20", "solver.smallest_step=0.02"]
+    stopped = run(load_case(small_tube, changes), tmp_path / "run")
+    assert not stopped.converged
+    assert "kPa in cavity" in stopped.reason
+    summary = json.loads((stopped.folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["solver"]["steps"] == RunStore.open(stopped.folder).n_steps > 0
+    assert 0 < summary["facts"]["last_fraction"] < 1
+    assert summary["facts"]["pressure:cavity_kPa"] == pytest.approx(summary["final"]["pressure_kPa"])
+    assert (stopped.folder / "report.html").exists()
+
+
+FIT = "materials.body={fit: 'soft rubber.csv', models: [yeoh-1, neo-hookean], poisson: 0.499}"
+
+
+@pytest.mark.usefixtures("unreported")
+def test_the_test_data_go_with_the_run(small_tube: Path, tmp_path: Path) -> None:
+    strain = np.linspace(0.0, 2.0, 41)
+    stress = 2 * 0.05 * ((1 + strain) - (1 + strain) ** -2)
+    lines = [f"{a:.5f};{b:.7f}" for a, b in zip(strain, stress, strict=True)]
+    data = small_tube.with_name("soft rubber.csv")
+    data.write_text("\n".join(["Engineering Strain;Engineering Stress (MPa)", *lines]), encoding="utf-8")
+    case = load_case(small_tube, [FIT, "solver.steps=1"])
+    fitted = run(case, tmp_path / "run")
+    resolved = yaml.safe_load((fitted.folder / "case.yaml").read_text(encoding="utf-8"))
+    assert resolved["materials"]["body"]["fit"] == ["data/soft rubber.csv"]
+    moved = fitted.folder.rename(tmp_path / "elsewhere")
+    document = RunStore.open(moved).fit
+    assert document is not None
+    assert document["recommended"] in {"yeoh-1", "neo-hookean"}
+    assert document["fits"][0]["parameters"]["C10"] == pytest.approx(0.05, rel=1e-4)
+    assert document["fits"][0]["curve"]["stress_MPa"][-1] == pytest.approx(stress[-1], rel=1e-3)
+    data.unlink()
+    again = run(load_case(moved / "case.yaml"), tmp_path / "again")
+    assert np.array_equal(displacements(again.folder), displacements(moved))
+    (moved / "data" / "soft rubber.csv").write_text("\n".join(["Strain;Stress (MPa)", *lines]), encoding="utf-8")
+    with pytest.raises(InputError, match="another case"):
+        run(load_case(again.folder / "case.yaml"), moved, resume=True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs kill -9")
+@pytest.mark.usefixtures("unreported")
+def test_kill_9_loses_no_finished_step(whole: Run, small_tube: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    command = [sys.executable, "-m", "turgor", "run", str(small_tube), "--out", str(folder)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not list(folder.glob("steps/*.npz")) and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait(timeout=30)
+    kept = RunStore.open(folder).n_steps
+    assert 1 <= kept <= 4
+    assert run(load_case(small_tube), folder, resume=True).converged
+    assert displacements(folder) == pytest.approx(displacements(whole.folder), abs=1e-5)
