@@ -3,141 +3,48 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from turgor.common.errors import InputError
+from turgor.materials.compressible import fit_bulk_modulus, fit_compressible
+from turgor.materials.fit_result import CONSTRAINED, Fit, FitReport, recommend
 from turgor.materials.hyperelastic import Hyperelastic
-from turgor.materials.least_squares import Problem, solve
-from turgor.materials.measurement import MaterialTest
+from turgor.materials.inequalities import Limits
+from turgor.materials.kinematics import Array
+from turgor.materials.least_squares import Problem, Solution, solve
+from turgor.materials.measurement import MaterialTest, Specimen
 from turgor.materials.registry import find_model
 from turgor.materials.registry import models as known_models
-from turgor.materials.stability import Verdict, digit_sensitivity, principal_stretches, stable_up_to, verdict
+from turgor.materials.stability import digit_sensitivity, principal_stretches, stable_up_to, verdict
+from turgor.materials.statistics import statistics
 from turgor.materials.testdata import read_tests
 
-SENSITIVITY_LIMIT = 0.02
-"""Rounding the constants to four digits may change the stress by so much of its largest value."""
-
-BIAXIAL_RATIOS = (0.9, 2.0)
-"""Equibiaxial over uniaxial stress at a stretch of 1.5: neo-Hookean 1.30, Treloar's natural rubber 1.47."""
-
 Data = str | Path | MaterialTest
+Model = str | type[Hyperelastic]
 
+PLAUSIBLE_RATIOS = (1.0, 1.5)
+"""Equibiaxial over uniaxial stress at a stretch of 1.5 that a constrained fit keeps where only uniaxial tension is
+known; well inside what is plausible at all."""
 
-@dataclass(frozen=True)
-class Fit:
-    """One model fitted to the tests.
-
-    ``rmse`` and ``residual_norm`` (√Σr²) are of the nominal stress in MPa over all points; ``r2`` is the coefficient
-    of determination; ``stable`` says whether Drucker's inequality holds in tension and compression of all modes as
-    far as the largest principal stretch of the tests; ``stability`` where it is lost at all.
-    """
-
-    model: str
-    material: Hyperelastic | None
-    parameters: dict[str, float]
-    rmse: float
-    residual_norm: float
-    r2: float
-    stable: bool
-    stability: Verdict | None
-    digit_sensitivity: float = np.inf
-    biaxial_ratio: float = np.nan
-    remark: str = ""
-
-    @property
-    def objections(self) -> tuple[str, ...]:
-        """Why this fit should not be used, most serious first; empty if nothing speaks against it."""
-        found = []
-        if not self.stable:
-            found.append("unstable in the range of the tests")
-        if not self.digit_sensitivity < SENSITIVITY_LIMIT:
-            found.append("its constants cancel each other: four digits do not fix its stress")
-        low, high = BIAXIAL_RATIOS
-        if not low <= self.biaxial_ratio <= high:
-            found.append(
-                f"its equibiaxial stress at a stretch of 1.5 is {self.biaxial_ratio:.2g} times the uniaxial one "
-                f"(elastomers: {low:g} to {high:g})"
-            )
-        return tuple(found)
-
-    def as_dict(self) -> dict[str, object]:
-        """Return the fit in plain values, keys ending in their unit."""
-        return {
-            "model": self.model,
-            "parameters": dict(self.parameters),
-            "units": "MPa",
-            "rmse_MPa": self.rmse,
-            "residual_norm_MPa": self.residual_norm,
-            "r2": self.r2,
-            "stable": self.stable,
-            "stability": str(self.stability) if self.stability else self.remark,
-            "initial_shear_modulus_MPa": self.material.shear_modulus if self.material else None,
-            "objections": list(self.objections),
-            "remark": self.remark,
-        }
-
-
-@dataclass(frozen=True)
-class FitReport:
-    """Every fit of one set of tests, best first, and the one that is recommended."""
-
-    fits: tuple[Fit, ...]
-    recommended: str | None
-    reason: str
-    tests: tuple[MaterialTest, ...]
-    strain_range: tuple[float, float] | None
-
-    def __getitem__(self, model: str) -> Fit:
-        """Return the fit of a model by its name."""
-        return next(fit for fit in self.fits if fit.model == find_model(model).name)
-
-    @property
-    def best(self) -> Hyperelastic:
-        """The material of the recommended fit.
-
-        Raises
-        ------
-        InputError
-            If no fit is stable in the range of the tests.
-        """
-        material = self[self.recommended].material if self.recommended else None
-        if material is None:
-            raise InputError(
-                "none of these models gives a material that is stable in the range of the tests",
-                key="models",
-                value=", ".join(fit.model for fit in self.fits),
-                file=self.tests[0].file or None,
-                expected="other models (all tries every one) or a narrower strain range",
-            )
-        return material
-
-    @property
-    def data(self) -> dict[str, object]:
-        """What was read, dropped and assumed, in plain values."""
-        return {
-            "tests": [test.as_dict() for test in self.tests],
-            "strain_range": list(self.strain_range) if self.strain_range else None,
-        }
-
-    def as_dict(self) -> dict[str, object]:
-        """Return everything in plain values, as ``turgor fit --json`` prints it."""
-        return {
-            "fits": [fit.as_dict() for fit in self.fits],
-            "recommended": self.recommended,
-            "reason": self.reason,
-            "data": self.data,
-        }
+RELATIVE_FLOOR = 0.02
+"""With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
 
 
 def fit(
     data: Data | Sequence[Data],
-    models: str | Sequence[str] = "all",
+    models: Model | Sequence[Model] = "all",
     *,
     strain_range: str | tuple[float, float] | None = None,
+    error: Literal["absolute", "relative"] = "absolute",
+    weights: Sequence[float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    stability: Literal["prefer", "require", "ignore"] = "prefer",
+    stable_to: float | None = None,
+    specimen: Specimen | None = None,
 ) -> FitReport:
     """Fit material models to one or several tests by least squares of the nominal stress.
 
@@ -146,48 +53,95 @@ def fit(
     data
         Files or tests; several are fitted together.
     models
-        Names of models, or ``"all"``.
+        Names of models, files of user models (``*.yaml``), classes, or ``"all"``.
     strain_range
         Engineering strains between which the tests are used: ``(0, 3)``, ``"0:3"`` or ``"0:300%"``.
+    error
+        ``"absolute"``: every point counts by its residual in MPa; ``"relative"``: by residual over stress.
+    weights
+        One factor for each test, in the order of reading; its points count by its square.
+    bounds
+        Narrower bounds of constants by name, in MPa or as numbers, for every model that has them.
+    stability
+        ``"prefer"``: plain fits, and beside those that speak against themselves, where the model is linear in its
+        constants, a constrained one; ``"require"``: every fit constrained to be stable; ``"ignore"``: plain fits only.
+    stable_to
+        The largest principal stretch to which the material must be stable; by default that of the tests.
+    specimen
+        What the files do not say: mode, dimensions, source of the strain.
 
     Returns
     -------
     FitReport
-        The fits, best first, and the recommended one: the best that is stable in the range in use, if any.
+        The fits, best first, and the recommended one, if any is stable.
 
     Raises
     ------
     InputError
-        If the data, a name or the strain range is wrong.
+        If the data, a name or an option is wrong.
     """
     kinds = _kinds(models)
     span = parse_strain_range(strain_range)
-    tests = _tests(data)
+    tests = _tests(data, specimen)
+    mechanical = tuple(test for test in tests if test.mode != "volumetric")
     if span:
-        tests = tuple(test.within(*span) for test in tests)
-    problem = Problem(tests, tuple(np.ones_like(test.stress) for test in tests))
-    fits = sorted((_fit_one(kind, problem) for kind in kinds), key=lambda found: found.residual_norm)
-    best, reason = _recommend(fits)
-    return FitReport(tuple(fits), best.model if best else None, reason, tests, span)
+        mechanical = tuple(test.within(*span) for test in mechanical)
+    if not mechanical:
+        raise InputError("there is only a volumetric test", key="data", expected="a test that changes the shape")
+    problem = Problem(mechanical, _point_weights(mechanical, error, weights), dict(bounds or {}))
+    stretch = largest_stretch(mechanical) if stable_to is None else stable_to
+    if not stretch >= 1.0:
+        raise InputError("this stretch must be above 1", key="stable_to", value=stable_to)
+    volumetric = [test for test in tests if test.mode == "volumetric"]
+    fits: list[Fit] = []
+    for kind in kinds:
+        fits.extend(_fits_of(kind, problem, stability, stretch, volumetric))
+    if not fits:
+        raise InputError("no constants of these models keep the limits", key="models", expected="other models")
+    fits.sort(key=lambda found: found.aic - 2.0 * len(found.parameters) if error == "relative" else found.residual_norm)
+    largest = float(np.abs(problem.stress).max())
+    best, reason = recommend(fits, largest)
+    return FitReport(tuple(fits), best.model if best else None, reason, mechanical + tuple(volumetric), span, error)
 
 
-def _kinds(names: str | Sequence[str]) -> list[type[Hyperelastic]]:
-    chosen = [names] if isinstance(names, str) else list(names)
+def _kinds(names: Model | Sequence[Model]) -> list[type[Hyperelastic]]:
+    chosen = [names] if isinstance(names, (str, type)) else list(names)
     if not chosen:
         raise InputError("no model is named", key="models", expected="names of models, or all")
-    if "all" in chosen:
-        return list(known_models().values())
-    return list(dict.fromkeys(find_model(name) for name in chosen))
+    found: list[type[Hyperelastic]] = []
+    for name in chosen:
+        if isinstance(name, type):
+            found.append(name)
+        elif name == "all":
+            found.extend(known_models().values())
+        else:
+            found.append(find_model(name))
+    return list(dict.fromkeys(found))
 
 
-def _tests(data: Data | Sequence[Data]) -> tuple[MaterialTest, ...]:
+def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[MaterialTest, ...]:
     items = [data] if isinstance(data, (str, Path, MaterialTest)) else list(data)
     tests: list[MaterialTest] = []
     for item in items:
-        tests.extend([item] if isinstance(item, MaterialTest) else read_tests(item))
+        tests.extend([item] if isinstance(item, MaterialTest) else read_tests(item, specimen))
     if not tests:
         raise InputError("no test data are given", key="data", expected="at least one file")
     return tuple(tests)
+
+
+def _point_weights(tests: Sequence[MaterialTest], error: str, weights: Sequence[float] | None) -> tuple[Array, ...]:
+    if error not in ("absolute", "relative"):
+        raise InputError("unknown kind of error", key="error", value=error, expected="absolute or relative")
+    factors = [1.0] * len(tests) if weights is None else [float(weight) for weight in weights]
+    if len(factors) != len(tests) or not all(0 <= f < np.inf for f in factors) or not any(factors):
+        expected = f"{len(tests)} numbers, one for each test, none negative"
+        raise InputError("these weights do not fit the tests", key="weights", value=weights, expected=expected)
+    found = []
+    for test, factor in zip(tests, factors, strict=True):
+        size = np.abs(test.stress)
+        scale = np.maximum(size, RELATIVE_FLOOR * size.max()) if error == "relative" else np.ones_like(size)
+        found.append(factor / np.where(scale > 0, scale, 1.0))
+    return tuple(found)
 
 
 _RANGE = re.compile(r"\s*(?P<low>[^:]*?)\s*(?P<low_percent>%?)\s*:\s*(?P<high>[^:]*?)\s*(?P<high_percent>%?)\s*")
@@ -203,51 +157,24 @@ def parse_strain_range(text: str | tuple[float, float] | None) -> tuple[float, f
     """
     if text is None:
         return None
-    expected = "two strains such as 0:3 or 0:300%"
+    wrong = InputError(
+        "this is not a range of strain", key="strain range", value=text, expected="two strains such as 0:3 or 0:300%"
+    )
     if isinstance(text, str):
         match = _RANGE.fullmatch(text)
         if match is None:
-            raise InputError("this is not a range of strain", key="strain range", value=text, expected=expected)
+            raise wrong
         percent = 0.01 if match["high_percent"] or match["low_percent"] else 1.0
         try:
             low = percent * float(match["low"]) if match["low"] else -np.inf
             high = percent * float(match["high"]) if match["high"] else np.inf
         except ValueError:
-            raise InputError(
-                "this is not a range of strain", key="strain range", value=text, expected=expected
-            ) from None
+            raise wrong from None
     else:
         low, high = (float(value) for value in text)
     if not low < high:
-        raise InputError("this range of strain is empty", key="strain range", value=text, expected=expected)
+        raise InputError("this range of strain is empty", key="strain range", value=text)
     return low, high
-
-
-def _fit_one(kind: type[Hyperelastic], problem: Problem) -> Fit:
-    solution = solve(kind, problem)
-    parameters = {c.name: float(v) for c, v in zip(kind.constants(), solution.values, strict=True)}
-    residual = problem.prediction(kind.trial(list(solution.values))) - problem.stress
-    squares = float(residual @ residual)
-    spread = float(np.sum((problem.stress - problem.stress.mean()) ** 2))
-    try:
-        material = kind.of(parameters)
-        remark = ""
-    except InputError as error:
-        material, remark = None, str(error)
-    largest = largest_stretch(problem.tests)
-    return Fit(
-        model=kind.name,
-        material=material,
-        parameters=parameters,
-        rmse=float(np.sqrt(squares / len(residual))),
-        residual_norm=float(np.sqrt(squares)),
-        r2=1.0 - squares / spread if spread > 0 else float("nan"),
-        stable=material is not None and stable_up_to(material, largest),
-        stability=verdict(material) if material else None,
-        digit_sensitivity=digit_sensitivity(material, largest) if material else np.inf,
-        biaxial_ratio=float(material.equibiaxial(1.5) / material.uniaxial(1.5)) if material else np.nan,
-        remark=remark,
-    )
 
 
 def largest_stretch(tests: Sequence[MaterialTest]) -> float:
@@ -262,16 +189,72 @@ def largest_stretch(tests: Sequence[MaterialTest]) -> float:
     return largest
 
 
-def _recommend(fits: Sequence[Fit]) -> tuple[Fit | None, str]:
-    """Choose the best fit, preferring those that nothing speaks against; never an unstable one."""
-    usable = [candidate for candidate in fits if candidate.stable]
-    if not usable:
-        return None, "no fit is stable in the range of the tests"
-    best = min(usable, key=lambda candidate: (len(candidate.objections), candidate.residual_norm))
-    reason = f"RMSE {best.rmse:.3g} MPa, stable as far as the tests go"
-    passed_over = [f"{fit.model}: {fit.objections[0]}" for fit in fits if fit.residual_norm < best.residual_norm]
-    if passed_over:
-        reason += ". Closer to the data, but not recommended: " + "; ".join(passed_over)
-    if best.objections:
-        reason += ". Use with care: " + "; ".join(best.objections)
-    return best, reason
+def _fits_of(
+    kind: type[Hyperelastic], problem: Problem, stability: str, stretch: float, volumetric: Sequence[MaterialTest]
+) -> list[Fit]:
+    """Fit one model, plainly or constrained or both."""
+    if stability not in ("prefer", "require", "ignore"):
+        expected = "prefer, require or ignore"
+        raise InputError("unknown choice", key="stability", value=stability, expected=expected)
+    biaxial_measured = any(test.mode in ("equibiaxial", "planar") for test in problem.tests)
+    limits = Limits(stretch, biaxial=None if biaxial_measured else PLAUSIBLE_RATIOS)
+    found = []
+    if stability != "require":
+        plain = solve(kind, problem)
+        if plain is not None:
+            found.append(_judged(kind, problem, plain, stretch, volumetric, constrained=False))
+    linear = all(constant.linear for constant in kind.constants())
+    wanted = stability == "require" or (stability == "prefer" and linear and found and found[0].objections)
+    if wanted:
+        kept = solve(kind, problem, limits)
+        judged = None if kept is None else _judged(kind, problem, kept, stretch, volumetric, constrained=True)
+        if judged is not None and judged.material is not None:
+            found.append(judged)
+    return found
+
+
+def _judged(
+    kind: type[Hyperelastic],
+    problem: Problem,
+    solution: Solution,
+    stretch: float,
+    volumetric: Sequence[MaterialTest],
+    *,
+    constrained: bool,
+) -> Fit:
+    """Turn constants into a fit with its numbers and verdicts."""
+    parameters = {c.name: float(v) for c, v in zip(kind.constants(), solution.values, strict=True)}
+    remark = ""
+    material: Hyperelastic | None = None
+    try:
+        material = fit_bulk_modulus(kind.of(parameters), volumetric)
+    except InputError as wrong:
+        remark = str(wrong)
+    residual = problem.prediction(kind.trial(list(solution.values))) - problem.stress
+    if material is not None and any(test.lateral is not None for test in problem.tests):
+        material, residual, remark = fit_compressible(material, problem)
+        parameters = material.parameters
+    squares = float(residual @ residual)
+    spread = float(np.sum((problem.stress - problem.stress.mean()) ** 2))
+    size = float(np.linalg.norm(problem.stress))
+    numbers = statistics(solution.jacobian, problem.weights, solution.cost)
+    intervals = zip(parameters.items(), numbers.half_widths.tolist(), strict=True)
+    return Fit(
+        model=kind.name + (CONSTRAINED if constrained else ""),
+        material=material,
+        parameters=parameters,
+        rmse=float(np.sqrt(squares / len(residual))),
+        residual_norm=float(np.sqrt(squares)),
+        relative_rmse=float(np.sqrt(squares)) / size if size > 0 else float("nan"),
+        r2=1.0 - squares / spread if spread > 0 else float("nan"),
+        aic=numbers.aic,
+        bic=numbers.bic,
+        stable=material is not None and stable_up_to(material, stretch),
+        stability=verdict(material) if material else None,
+        confidence={} if constrained else {name: (v - half, v + half) for (name, v), half in intervals},
+        correlation=numbers.correlation,
+        digit_sensitivity=digit_sensitivity(material, largest_stretch(problem.tests)) if material else np.inf,
+        biaxial_ratio=float(material.equibiaxial(1.5) / material.uniaxial(1.5)) if material else np.nan,
+        biaxial_measured=any(test.mode == "equibiaxial" for test in problem.tests),
+        remark=remark,
+    )

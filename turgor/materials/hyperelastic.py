@@ -75,6 +75,8 @@ class Hyperelastic:
     name: ClassVar[str] = ""
     aliases: ClassVar[tuple[str, ...]] = ()
     basis: ClassVar[str] = ""
+    smooth_at_rest: ClassVar[bool] = True
+    """Whether W̄ has a third derivative in the undeformed state."""
 
     volumetric: Volumetric = None  # type: ignore[assignment]  # set from μ below where it is left out
     density: float | None = None

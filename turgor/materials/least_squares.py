@@ -7,24 +7,27 @@ only one to four constants are searched for, from a fixed list of starts: the sa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
 from turgor.common.errors import InputError
 from turgor.materials.hyperelastic import Hyperelastic
+from turgor.materials.inequalities import Limits
 from turgor.materials.kinematics import Array
 from turgor.materials.measurement import MaterialTest
 
-STARTS_POLISHED = 6
+STARTS_POLISHED = 5
 """So many of the best starts are followed to their minimum."""
 
-SCREENING_POINTS = 60
+SCREENING_POINTS = 40
 """Starts are compared on so many points of each test."""
 
 _TINY = 1e-300
+_FAR = 1e3
+"""Residual of a trial that has no finite stress or keeps no limit, relative to the measured stress."""
 
 
 def predict(material: Hyperelastic, test: MaterialTest) -> Array:
@@ -40,10 +43,14 @@ def predict(material: Hyperelastic, test: MaterialTest) -> Array:
 
 @dataclass(frozen=True)
 class Problem:
-    """The tests of one fit with the weight of each of their points, ``sqrt(weight) / scale``."""
+    """The tests of one fit with the weight of each of their points: Σ (weight · residual)² is made least.
+
+    ``bounds`` narrow the constants of any model by name.
+    """
 
     tests: tuple[MaterialTest, ...]
     point_weights: tuple[Array, ...]
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def stress(self) -> Array:
@@ -57,7 +64,7 @@ class Problem:
 
     def prediction(self, material: Hyperelastic) -> Array:
         """Nominal stresses of `material` at all points, one test after the other."""
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return np.concatenate([predict(material, test) for test in self.tests])
 
     def thinned(self, points: int) -> Problem:
@@ -67,7 +74,7 @@ class Problem:
             chosen = np.unique(np.linspace(0, len(test.stretch) - 1, points).astype(int))
             tests.append(MaterialTest(test.mode, test.stretch[chosen], test.stress[chosen]))
             weights.append(weight[chosen])
-        return Problem(tuple(tests), tuple(weights))
+        return replace(self, tests=tuple(tests), point_weights=tuple(weights))
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,7 @@ class Solution:
     jacobian: Array
 
 
-def solve(model: type[Hyperelastic], problem: Problem, *, nonnegative: bool = False) -> Solution:
+def solve(model: type[Hyperelastic], problem: Problem, limits: Limits | None = None) -> Solution | None:
     """Fit the constants of `model`.
 
     Parameters
@@ -87,9 +94,14 @@ def solve(model: type[Hyperelastic], problem: Problem, *, nonnegative: bool = Fa
     model
         The class of material.
     problem
-        Tests and weights.
-    nonnegative
-        Keep every modulus at or above zero.
+        Tests, weights and bounds.
+    limits
+        Inequalities that the material must keep, such as stability.
+
+    Returns
+    -------
+    Solution or None
+        ``None`` if no constants keep the limits.
 
     Raises
     ------
@@ -103,93 +115,117 @@ def solve(model: type[Hyperelastic], problem: Problem, *, nonnegative: bool = Fa
             key="models",
             expected="more points or a model with fewer constants",
         )
-    linear = _Linear(model, problem, nonnegative)
-    if not linear.searched:
-        best: tuple[float, ...] = ()
-    else:
-        best = _search(model, problem, linear, nonnegative)
-    values = linear.constants(np.array(best))
+    linear = _Linear(model, problem, limits)
+    best = _search(model, linear) if linear.searched else np.zeros(0)
+    moduli, relative = linear.solve(best)
+    if relative[0] == _FAR:
+        return None
+    values = linear.assemble(moduli, best)
     residual = linear.weights * (linear.prediction(values) - linear.stress)
-    return Solution(values, float(residual @ residual), _jacobian(model, problem, values, linear))
+    return Solution(values, float(residual @ residual), _jacobian(values, linear))
 
 
 class _Linear:
     """The linear problem of the moduli at given values of the constants that are searched for."""
 
-    def __init__(self, model: type[Hyperelastic], problem: Problem, nonnegative: bool) -> None:
-        self.model, self.problem = model, problem
+    def __init__(self, model: type[Hyperelastic], problem: Problem, limits: Limits | None) -> None:
+        self.model, self.problem, self.limits = model, problem, limits
         constants = model.constants()
+        bounds = np.array([_narrowed(c.bounds, problem.bounds.get(c.name), c.name) for c in constants])
         self.moduli = [i for i, constant in enumerate(constants) if constant.linear]
         self.searched = [i for i, constant in enumerate(constants) if not constant.linear]
-        self.lower = np.array([0.0 if nonnegative else constants[i].bounds[0] for i in self.moduli])
+        self.bounds = bounds[self.moduli].T
+        self.searched_bounds = bounds[self.searched].T
         self.stress, self.weights = problem.stress, problem.weights
         self.scale = float(np.linalg.norm(self.weights * self.stress)) or 1.0
+
+    def coarse(self, points: int) -> _Linear:
+        return _Linear(self.model, self.problem.thinned(points), self.limits)
 
     def prediction(self, values: Array) -> Array:
         return self.problem.prediction(self.model.trial(list(values)))
 
+    def assemble(self, moduli: Array, searched: Array) -> Array:
+        values = np.zeros(len(self.moduli) + len(self.searched))
+        values[self.searched] = searched
+        values[self.moduli] = moduli
+        return values
+
+    def units(self, searched: Array) -> list[Hyperelastic]:
+        """Materials in which one modulus is 1 MPa and the others are zero."""
+        return [self.model.trial(list(self.assemble(unit, searched))) for unit in np.eye(len(self.moduli))]
+
     def columns(self, searched: Array) -> Array:
         """Stresses per unit of each modulus, ``(points, moduli)``."""
-        columns = []
-        for i in self.moduli:
-            values = np.zeros(len(self.moduli) + len(self.searched))
-            values[self.searched] = searched
-            values[i] = 1.0
-            columns.append(self.prediction(values))
-        return np.column_stack(columns)
+        return np.column_stack([self.problem.prediction(material) for material in self.units(searched)])
 
     def solve(self, searched: Array) -> tuple[Array, Array]:
         """Return the best moduli and the weighted residual, relative to the norm of the weighted stress."""
-        A = self.columns(searched) * (self.weights / self.scale)[:, None]
         y = self.weights * self.stress / self.scale
-        if not np.all(np.isfinite(A)):
-            return np.zeros(len(self.moduli)), np.full_like(y, 1e3)
+        A = self.columns(searched) * (self.weights / self.scale)[:, None]
         norms = np.maximum(np.linalg.norm(A, axis=0), _TINY)
+        far = np.zeros(len(self.moduli)), np.full_like(y, _FAR)
+        if not np.all(np.isfinite(norms)):
+            return far
         scaled = A / norms
-        x = np.linalg.lstsq(scaled, y, rcond=None)[0]
-        if np.any(x < self.lower * norms):
-            x = lsq_linear(scaled, y, bounds=(self.lower * norms, np.inf), method="bvls").x
+        x: Array | None = np.linalg.lstsq(scaled, y, rcond=None)[0]
+        assert x is not None
+        low, high = self.bounds * norms
+        if self.limits is not None:
+            x = self.limits.enforce(scaled, y, x, self.units(searched), norms, *_as_rows(low, high))
+        elif np.any(x < low) or np.any(x > high):
+            x = lsq_linear(scaled, y, bounds=(low, high), method="bvls").x
+        if x is None:
+            return far
         return x / norms, scaled @ x - y
 
     def residual(self, searched: Array) -> Array:
         return self.solve(searched)[1]
 
-    def constants(self, searched: Array) -> Array:
-        values = np.zeros(len(self.moduli) + len(self.searched))
-        values[self.searched] = searched
-        values[self.moduli] = self.solve(searched)[0]
-        return values
+
+def _narrowed(own: tuple[float, float], given: tuple[float, float] | None, name: str) -> tuple[float, float]:
+    low, high = own if given is None else (max(own[0], given[0]), min(own[1], given[1]))
+    if not low < high:
+        raise InputError("these bounds leave nothing", key=f"bounds of {name}", value=given, expected=f"within {own}")
+    return low, high
 
 
-def _search(model: type[Hyperelastic], problem: Problem, linear: _Linear, nonnegative: bool) -> tuple[float, ...]:
-    constants = model.constants()
-    bounds = np.array([constants[i].bounds for i in linear.searched]).T
-    coarse = _Linear(model, problem.thinned(SCREENING_POINTS), nonnegative)
-    starts = model.starts()
+def _as_rows(low: Array, high: Array) -> tuple[Array, Array]:
+    """Write low ≤ x ≤ high as rows · x ≥ floors, the infinite ones left out."""
+    eye = np.eye(len(low))
+    rows = np.vstack([eye[np.isfinite(low)], -eye[np.isfinite(high)]])
+    return rows, np.concatenate([low[np.isfinite(low)], -high[np.isfinite(high)]])
+
+
+def _search(model: type[Hyperelastic], linear: _Linear) -> Array:
+    coarse = linear.coarse(SCREENING_POINTS)
+    low, high = linear.searched_bounds
+    starts = list(dict.fromkeys(tuple(np.clip(start, low, high)) for start in model.starts()))
     costs = [float(np.sum(coarse.residual(np.array(start)) ** 2)) for start in starts]
     chosen = [starts[i] for i in np.argsort(costs, kind="stable")[:STARTS_POLISHED]]
-    minima = [_descend(coarse, start, bounds, 1e-8) for start in chosen]
+    minima = [_descend(coarse, start, 1e-6, "2-point") for start in chosen]
     nearest = min(minima, key=lambda found: float(found.cost))
-    polished = _descend(linear, nearest.x, bounds, 1e-15)
-    return tuple(float(value) for value in polished.x)
+    return np.asarray(_descend(linear, nearest.x, 1e-15, "3-point").x, dtype=float)
 
 
-def _descend(linear: _Linear, start: Sequence[float] | Array, bounds: Array, tolerance: float) -> OptimizeResult:
-    inside = np.clip(start, bounds[0] + 1e-9 * np.abs(bounds[0]), bounds[1] - 1e-9 * np.abs(bounds[1]))
+def _descend(linear: _Linear, start: Sequence[float] | Array, tolerance: float, jacobian: str) -> OptimizeResult:
+    low, high = linear.searched_bounds
+    width = np.minimum(high - low, 1.0)
+    inside = np.clip(start, low + 1e-9 * width, high - 1e-9 * width)
     return least_squares(
         linear.residual,
         inside,
-        bounds=bounds,
-        jac="3-point",
+        bounds=(low, high),
+        jac=jacobian,
         x_scale=np.maximum(np.abs(inside), 0.1),
         ftol=tolerance,
         xtol=tolerance,
         gtol=tolerance,
-        max_nfev=200,
+        max_nfev=100,
     )
 
 
-def _jacobian(model: type[Hyperelastic], problem: Problem, values: Array, linear: _Linear) -> Array:
+def _jacobian(values: Array, linear: _Linear) -> Array:
     """Derivatives of the (unweighted) stresses by all constants, ``(points, constants)``."""
     J = np.empty((len(linear.stress), len(values)))
     J[:, linear.moduli] = linear.columns(values[linear.searched])

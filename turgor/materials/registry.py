@@ -14,6 +14,7 @@ from difflib import get_close_matches
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.materials import models as package
+from turgor.materials.expression import load_model
 from turgor.materials.hyperelastic import Constant, Hyperelastic
 from turgor.materials.models.ogden import OgdenModel
 from turgor.materials.volumetric import LAWS, bulk_modulus_from
@@ -39,13 +40,15 @@ def models() -> dict[str, type[Hyperelastic]]:
 
 
 def find_model(name: str) -> type[Hyperelastic]:
-    """Return the model that is called `name`, or has it among its aliases.
+    """Return the model that is called `name`, has it among its aliases, or is written in the file `name` (``*.yaml``).
 
     Raises
     ------
     InputError
         If there is none; the message suggests near names.
     """
+    if str(name).endswith((".yaml", ".yml")):
+        return load_model(name)
     for model in models().values():
         if name == model.name or name in model.aliases:
             return model

@@ -23,6 +23,8 @@ _PATHS: dict[str, Callable[[Array], Array]] = {
 }
 """The principal stretches of each mode against its stretch."""
 
+MODES = tuple(_PATHS)
+
 STRETCHES = (0.3, 6.0)
 """The range that a verdict covers unless another is asked for."""
 
@@ -68,8 +70,14 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
         return None
 
     def margin(log_stretch: Array) -> Array:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.nan_to_num(drucker_margin(material, principal_stretches(mode, np.exp(log_stretch))), nan=-1.0)
+        # Beyond its locking stretch a material has infinite energy: it does not go there, which is not a loss.
+        stretches = principal_stretches(mode, np.exp(log_stretch))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            locked = np.isposinf(material.principal(stretches)[0])
+            matrix = drucker_matrix(material, stretches) / material.shear_modulus
+            finite = np.all(np.isfinite(matrix), axis=(-2, -1))
+            found = np.linalg.eigvalsh(np.where(finite[..., None, None], matrix, -np.eye(2)))[..., 0]
+        return np.asarray(np.where(locked, 1.0, found), dtype=float)
 
     # Quadratic spacing: sets that are lost, are often lost within a few per cent of strain.
     path = np.log(end) * np.linspace(0.0, 1.0, _SAMPLES) ** 2

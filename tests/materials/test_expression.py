@@ -1,0 +1,128 @@
+"""Models that a user writes as an expression."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from turgor.common.errors import InputError
+from turgor.materials import create, find_model
+from turgor.materials.expression import define_model
+from turgor.materials.fit import fit
+from turgor.materials.measurement import MaterialTest
+
+HERE = Path(__file__).parent
+
+
+def model(energy: str, **constants):
+    return define_model({"name": "mine", "energy": energy, "constants": constants or {"mu": {"unit": "MPa"}}})
+
+
+def test_known_models_come_out_the_same():
+    yeoh = model("a*(I1-3) + b*(I1-3)**2", a={"unit": "MPa"}, b={"unit": "MPa"})
+    written = yeoh(a=0.1, b=0.02)
+    built = create("yeoh-2", {"C10": 0.1, "C20": 0.02})
+    F = np.eye(3) + 0.3 * np.random.default_rng(0).standard_normal((5, 3, 3))
+    F = F[np.linalg.det(F) > 0.2]
+    np.testing.assert_allclose(written.tangent(F), built.tangent(F), rtol=1e-12, atol=1e-12)
+    assert written.shear_modulus == pytest.approx(built.shear_modulus)
+    ogden = model(
+        "2*mu/alpha**2*(lambda1**alpha + lambda2**alpha + lambda3**alpha - 3)",
+        mu={"unit": "MPa"},
+        alpha={"start": [1, 3], "bounds": [0.1, 9]},
+    )
+    written, built = ogden(mu=0.1, alpha=3.3), create("ogden-1", {"mu1": 0.1, "alpha1": 3.3})
+    np.testing.assert_allclose(written.tangent(F), built.tangent(F), rtol=1e-11, atol=1e-11)
+    assert written.shear_modulus == pytest.approx(0.1)
+
+
+def test_a_file_is_a_model_wherever_a_name_is():
+    file = str(HERE / "user_invariants.yaml")
+    material = create(file, {"a": "0.05 MPa", "b": "1e-5 MPa", "c": "0.02 MPa"}, poisson=0.45)
+    assert material.name == "test-carroll"
+    assert material.poisson_ratio == pytest.approx(0.45)
+    assert float(material.energy(np.eye(3))) == pytest.approx(0.0, abs=1e-15)
+    assert find_model(file)(a=0.05, b=1e-5, c=0.02).parameters == pytest.approx(material.parameters)
+
+
+@pytest.mark.parametrize("name", ["user_invariants.yaml", "user_stretches.yaml"])
+def test_fit_recovers_a_user_model(name):
+    kind = find_model(str(HERE / name))
+    values = {c.name: 0.05 / 30.0**i if c.linear else 3.1 for i, c in enumerate(kind.constants())}
+    if name == "user_invariants.yaml":
+        values = {"a": 0.05, "b": 2e-6, "c": 0.03}
+    material = kind(**values)
+    x = np.linspace(0.7, 3.0, 60)
+    tests = [MaterialTest(mode, x, getattr(material, mode)(x)) for mode in ("uniaxial", "equibiaxial")]
+    found = fit(tests, str(HERE / name)).fits[0]
+    assert found.parameters == pytest.approx(values, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "energy",
+    [
+        "__import__('os').system('touch /tmp/owned')",
+        "mu*(I1-3) if I1 else mu",
+        "mu*[I1][0]",
+        "(lambda: mu*I1)()",
+        "mu*I1.real",
+        "mu*exp(I1, 2)",
+        "mu*(I1-3) + True",
+        "mu*I1**(9**9**9)",
+        "mu*(I1-3); I1",
+        "mu*(I1 -",
+        "mu*I3",
+        "mu*foo(I1)",
+        "mu*(I1-3) + lambda1",
+        "mu",
+        "",
+        "mu*I1" + "+mu*I1" * 400,
+        "mu*(I1/0)",
+        "I1 - 3",
+        "mu**2*(I1-3)",
+        "mu*(I1-3) + 1",
+        "mu*(lambda1**2 + 2*lambda2**2 + lambda3**2 - 4)",
+    ],
+)
+def test_anything_else_is_refused(energy):
+    with pytest.raises(InputError, match=r"energy|deformation"):
+        model(energy)
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        None,
+        [],
+        {"name": "x"},
+        {"name": "X y", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa"}}},
+        {"name": "x", "energy": "mu*I1", "constants": {}},
+        {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "mm"}}},
+        {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa", "extra": 1}}},
+        {"name": "x", "energy": "mu*I1", "constants": {"I1": {"unit": "MPa"}}},
+        {"name": "x", "energy": "mu*I1**n", "constants": {"mu": {"unit": "MPa"}, "n": {"start": ["a"]}}},
+        {"name": "x", "energy": "mu*I1**n", "constants": {"mu": {"unit": "MPa"}, "n": {"start": 5, "bounds": [0, 1]}}},
+        {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa"}, "k": {"unit": "MPa"}}},
+        {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa"}}, "code": "import os"},
+    ],
+)
+def test_wrong_documents(document):
+    with pytest.raises(InputError):
+        define_model(document)
+
+
+def test_wrong_files_are_named(tmp_path):
+    file = tmp_path / "model.yaml"
+    with pytest.raises(InputError, match=r"model\.yaml"):
+        find_model(str(file))
+    file.write_text("name: [")
+    with pytest.raises(InputError, match=r"model.yaml.*YAML"):
+        find_model(str(file))
+    file.write_text("!!python/object/apply:os.system ['true']")
+    with pytest.raises(InputError, match=r"model.yaml.*YAML"):
+        find_model(str(file))
+    file.write_text("name: x\nenergy: mu*I3\nconstants: {mu: {unit: MPa}}")
+    with pytest.raises(InputError, match=r"model.yaml.*I3"):
+        find_model(str(file))
