@@ -65,6 +65,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "poisson-0.6.yaml": ("materials.body.poisson", "0.6", "below 0.5"),
     "pressure-of-1e9.yaml": ("loads.0.value", "times the shear modulus", "check both units"),
     "python-tag.yaml": ("line 4", "python/object/apply:os.system", "not allowed"),
+    "steps-against-each-other.yaml": ("solver.smallest_step", "more than the largest step"),
     "steps-and-outputs.yaml": ("solver", "only one of the two"),
     "strain-range-of-one.yaml": ("materials.body.strain_range", "0:3"),
     "strain-range-reversed.yaml": ("materials.body.strain_range", "1:0.5", "empty"),

@@ -100,9 +100,11 @@ class SolverCase(StrictModel):
         return PathOptions(newton, largest_step=self.largest_step, smallest_step=self.smallest_step)
 
     @model_validator(mode="after")
-    def _steps_or_outputs(self) -> Self:
+    def _agrees_with_itself(self) -> Self:
         if self.steps is not None and self.outputs is not None:
             raise invalid("both steps and outputs are given", expected="only one of the two")
+        if self.smallest_step > self.largest_step:
+            raise invalid("this is more than the largest step", key="smallest_step", value=self.smallest_step)
         return self
 
 
