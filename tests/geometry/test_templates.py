@@ -5,8 +5,13 @@ import pytest
 
 from turgor.common.errors import InputError
 from turgor.geometry.actuator import Actuator
+from turgor.geometry.bellows import Bellows
 from turgor.geometry.catalogue import actuator, template, templates
+from turgor.geometry.fibre_tube import FibreTube
+from turgor.geometry.honeycomb import Honeycomb
+from turgor.geometry.membrane import Membrane
 from turgor.geometry.pneunet import PneuNet
+from turgor.geometry.reinforced_tube import ReinforcedTube
 from turgor.geometry.tube import CappedTube
 
 NAMES = list(templates())
@@ -90,6 +95,28 @@ IMPOSSIBLE = {
     "passage as high as the chamber": (PneuNet, {"tunnel_height": "13 mm"}, "tunnel_height"),
     "passage wider than the chamber": (PneuNet, {"tunnel_width": "10.5 mm"}, "tunnel_width"),
     "gaps filled": (PneuNet, {"tunnel_roof": "13 mm"}, "tunnel_roof"),
+    "bend tighter than the wall": (Bellows, {"rounding": "0.6 mm"}, "rounding"),
+    "flanks too flat": (Bellows, {"flank_angle": "1 deg"}, "flank_angle"),
+    "roots outside the crests": (Bellows, {"root_radius": "14 mm"}, "root_radius"),
+    "roots on the axis": (Bellows, {"root_radius": "1 mm"}, "root_radius"),
+    "inlet wider than its mount": (Bellows, {"inlet_radius": "5 mm"}, "inlet_radius"),
+    "mount wider than the bottom": (Bellows, {"mount_radius": "9 mm"}, "mount_radius"),
+    "inlet wider than the chamber": (Membrane, {"inlet_diameter": "2.5 mm"}, "inlet_diameter"),
+    "membrane thicker than the zone": (Membrane, {"membrane": "5 mm"}, "membrane"),
+    "flat longer than the cell": (Honeycomb, {"web_length": "55 mm"}, "web_length"),
+    "end walls meet": (Honeycomb, {"end_wall": "10 mm"}, "end_wall"),
+    "cell walls meet": (Honeycomb, {"thickness": "9.5 mm"}, "thickness"),
+    "rounding larger than the cell": (Honeycomb, {"rounding": "6 mm"}, "rounding"),
+    "cavity wider than the tube": (ReinforcedTube, {"inner_diameter": "18 mm"}, "inner_diameter"),
+    "no cap left": (ReinforcedTube, {"cavity_length": "115 mm"}, "cavity_length"),
+    "band around the tube": (ReinforcedTube, {"band_width": "30 mm"}, "band_width"),
+    "rings longer than the tube": (ReinforcedTube, {"rings": 30}, "rings"),
+    "fibre caps meet": (FibreTube, {"cap": "170 mm"}, "cap"),
+    "fibres longer than the tube": (FibreTube, {"fibre_length": "340 mm"}, "fibre_length"),
+    "no fibre fits": (FibreTube, {"fibre_length": "0.1 mm", "pitch": "50 mm"}, "fibre_length"),
+    "tilt too steep": (FibreTube, {"tilt": "80 deg"}, "tilt"),
+    "winding unknown": (FibreTube, {"winding": "up"}, "winding"),
+    "no fibre": (FibreTube, {"fibres": 0}, "fibres"),
     "not a yes or no": (PneuNet, {"symmetric": "perhaps"}, "symmetric"),
 }
 

@@ -3,8 +3,6 @@ import math
 import gmsh
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
-from hypothesis import strategies as st
 
 from turgor.common.errors import InputError
 from turgor.geometry.pneunet import PneuNet
@@ -218,56 +216,3 @@ def test_nodes_on_a_polyline_come_in_its_order():
     np.testing.assert_array_equal(places, [[1, 0, 0], [0.5, 0, 0], [0, 0, 0], [0, 0, 0.5], [0, 0, 1]])
     with pytest.raises(InputError, match="edge: no node"):
         nodes_on_polyline(points, np.array([[0.3, 0.3, 0.3]]), "edge")
-
-
-def lengths(low, high):
-    return st.floats(low, high).map(lambda number: f"{number:.4f} mm")
-
-
-random_examples = settings(
-    max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much]
-)
-
-
-@random_examples
-@given(st.data())
-def test_random_fingers_are_valid_and_exact(data):
-    draw = data.draw
-    parameters = {
-        key: draw(lengths(low, high), label=key)
-        for key, (low, high) in {
-            "chamber_length": (1.0, 8.0),
-            "chamber_width": (3.0, 20.0),
-            "chamber_height": (3.0, 20.0),
-            "gap": (0.3, 4.0),
-            "wall": (0.6, 4.0),
-            "side_wall": (0.6, 4.0),
-            "top_wall": (0.6, 4.0),
-            "end_wall": (0.6, 8.0),
-            "tunnel_height": (0.6, 5.0),
-            "tunnel_width": (0.6, 8.0),
-            "tunnel_roof": (0.5, 4.0),
-            "first_layer": (0.5, 4.0),
-            "second_layer": (0.2, 3.0),
-        }.items()
-    }
-    try:
-        finger = PneuNet(chambers=draw(st.integers(1, 4)), symmetric=draw(st.booleans()), **parameters)
-    except InputError:
-        assume(False)
-    mesh = generate(finger, 6.0)
-    share = 0.5 if finger.symmetric else 1.0
-    assert_sound(mesh)
-    assert mesh.enclosed_volume("cavity") == pytest.approx(share * pneunet_air(finger), rel=1e-6)
-    assert mesh.volume() == pytest.approx(share * pneunet_solid(finger), rel=1e-6)
-
-
-@random_examples
-@given(radius=lengths(1.0, 20.0), wall=lengths(0.5, 10.0), cap=lengths(0.5, 20.0), air=st.floats(1.0, 60.0))
-def test_random_tubes_are_valid(radius, wall, cap, air):
-    length = f"{2 * float(cap.split()[0]) + air:.4f} mm"
-    tube = CappedTube(inner_radius=radius, wall=wall, cap=cap, length=length)
-    mesh = generate(tube, 6.0)
-    assert_sound(mesh)
-    volume = math.pi * tube.inner_radius**2 * (tube.length - 2 * tube.cap)
-    assert mesh.enclosed_volume("cavity") == pytest.approx(volume, rel=0.005)

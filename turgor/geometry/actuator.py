@@ -36,12 +36,15 @@ class Shape:
         its first point to its last, become the marker (one point: the node there).
     curves
         Name → points ``(j, 3)`` of a curve embedded in the solid without shaping the mesh (a fibre).
+    sizes
+        Name of a region or surface → element size in mm there, where it is smaller than elsewhere at the default size.
     """
 
     regions: Mapping[str, Sequence[int]]
     surfaces: Mapping[str, Sequence[int]]
     markers: Mapping[str, FloatArray] = field(default_factory=dict)
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,9 @@ class Actuator(BaseModel, ABC):
 
     template: ClassVar[str]
     """The name by which case files and commands call the template."""
+
+    per_circle: ClassVar[int] = 12
+    """Elements along a full circle by default: longer ones would bulge through a thin wall when they are curved."""
 
     def __init__(self, **parameters: Any) -> None:
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from types import ModuleType
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.common.optional import require
+from turgor.geometry.path import Piece
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -54,7 +56,43 @@ def prism(corners: Sequence[tuple[float, float, float]], extent: tuple[float, fl
     draw = occ()
     points = [draw.addPoint(*corner) for corner in corners]
     edges = [draw.addLine(start, end) for start, end in zip(points, points[1:] + points[:1], strict=True)]
-    face = draw.addPlaneSurface([draw.addCurveLoop(edges)])
+    return sweep(int(draw.addPlaneSurface([draw.addCurveLoop(edges)])), extent)
+
+
+def cylinder(low: float, high: float, radius: float, half: bool = False) -> tuple[int, int]:
+    """Draw a cylinder around z between two heights, or its half y ≥ 0; return it as (dimension, tag)."""
+    angle = math.pi if half else 2.0 * math.pi
+    return 3, int(occ().addCylinder(0, 0, low, 0, 0, high - low, radius, angle=angle))
+
+
+def plane_face(*outlines: Sequence[Piece]) -> int:
+    """Draw a face in the plane y = 0, coordinates (x, z), and return its tag.
+
+    The first outline is the outside, the others are holes. Each is closed, its pieces follow each other, and a piece
+    shorter than 1e-9 mm is left out.
+    """
+    draw = occ()
+    return int(draw.addPlaneSurface([draw.addCurveLoop(_edges_along(outline)) for outline in outlines]))
+
+
+def _edges_along(outline: Sequence[Piece]) -> list[int]:
+    draw = occ()
+    pieces = [piece for piece in outline if math.dist(piece.start, piece.end) > 1e-9]
+    corners = [draw.addPoint(piece.start[0], 0.0, piece.start[1]) for piece in pieces]
+    edges = []
+    for piece, start, end in zip(pieces, corners, corners[1:] + corners[:1], strict=True):
+        if piece.centre is None:
+            edges.append(draw.addLine(start, end))
+        else:
+            centre = draw.addPoint(piece.centre[0], 0.0, piece.centre[1])
+            edges.append(draw.addCircleArc(start, centre, end))
+            draw.remove([(0, centre)])
+    return edges
+
+
+def sweep(face: int, extent: tuple[float, float, float]) -> int:
+    """Sweep a face along `extent`, which it is used up by, and return the volume's tag."""
+    draw = occ()
     swept = draw.extrude([(2, face)], *extent)
     draw.remove([(2, face)])
     return next(int(tag) for dimension, tag in swept if dimension == 3)
@@ -102,12 +140,29 @@ def skins(faces: Collection[int]) -> list[list[int]]:
     return sorted(groups, key=_extent, reverse=True)
 
 
-def embed_point(point: tuple[float, float, float], face: int) -> None:
-    """Make the mesh of a `face` have a node at `point`, which must lie on it."""
-    gmsh = kernel()
-    tag = gmsh.model.occ.addPoint(*point)
-    gmsh.model.occ.synchronize()
-    gmsh.model.mesh.embed(0, [tag], 2, face)
+def named_skin(faces: Collection[int], axis: str, length: float, symmetric: bool = False) -> dict[str, list[int]]:
+    """Name the boundary of a solid with one cavity whose end faces are the planes 0 and `length` along `axis`.
+
+    Returns
+    -------
+    dict
+        ``mount``, ``tip-face``, ``outer``, ``cavity`` and, for a half that ends in the plane y = 0, ``symmetry``.
+    """
+    symmetry = faces_in_plane(faces, "y", 0.0) if symmetric else []
+    outside, cavity = skins([face for face in faces if face not in symmetry])
+    mount, tip = (faces_in_plane(outside, axis, place) for place in (0.0, length))
+    outer = [face for face in outside if face not in mount + tip]
+    named = {"mount": mount, "tip-face": tip, "outer": outer, "cavity": cavity}
+    return {**named, "symmetry": symmetry} if symmetric else named
+
+
+def with_points(volume: int, points: Any) -> int:
+    """Make the mesh of a `volume` have nodes at `points` ``(k, 3)`` of its skin; synchronise and return its new tag."""
+    draw = occ()
+    vertices = [(0, draw.addPoint(*point)) for point in points]
+    _, pieces = draw.fragment([(3, volume)], vertices)
+    draw.synchronize()
+    return int(pieces[0][0][1])
 
 
 def _edges(face: int) -> set[int]:

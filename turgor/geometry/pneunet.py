@@ -99,19 +99,12 @@ class PneuNet(Actuator):
             name: [tag for _, tag in piece]
             for name, piece in zip(("body", "base"), pieces[: len(solids)], strict=False)
         }
+        tags = [tag for piece in regions.values() for tag in piece]
         return Shape(
             regions=regions,
-            surfaces=self._surfaces(cad.boundary([tag for tags in regions.values() for tag in tags])),
+            surfaces=cad.named_skin(cad.boundary(tags), "x", self.length, self.symmetric),
             markers={"base": ends[:1], "tip": ends[1:], "centreline": ends},
         )
-
-    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
-        symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.symmetric else []
-        outside, cavity = cad.skins([face for face in faces if face not in symmetry])
-        mount, tip = (cad.faces_in_plane(outside, "x", x) for x in (0.0, self.length))
-        rest = [face for face in outside if face not in mount + tip]
-        named = {"mount": mount, "tip-face": tip, "outer": rest, "cavity": cavity, "symmetry": symmetry}
-        return {name: tags for name, tags in named.items() if tags}
 
     def _chamber_starts(self) -> Iterator[float]:
         """Yield the x at which the inside of each chamber begins."""

@@ -47,22 +47,13 @@ class CappedTube(Actuator):
         outer = self.inner_radius + self.wall
         solid = occ.addCylinder(0, 0, 0, 0, 0, self.length, outer)
         air = occ.addCylinder(0, 0, self.cap, 0, 0, self.length - 2 * self.cap, self.inner_radius)
-        (body,), _ = occ.cut([(3, solid)], [(3, air)])
-        occ.synchronize()
-        outside, cavity = cad.skins(cad.boundary([body[1]]))
-        mount, tip = (cad.faces_in_plane(outside, "z", z) for z in (0.0, self.length))
-        cad.embed_point((0, 0, 0), mount[0])
-        cad.embed_point((0, 0, self.length), tip[0])
+        (hollow,), _ = occ.cut([(3, solid)], [(3, air)])
         ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        body = cad.with_points(hollow[1], ends)
         # OpenCASCADE's seam of the cylinder is the edge that carries the nodes of the centreline.
         seam = ends + np.array([outer, 0.0, 0.0])
         return Shape(
-            regions={"body": [body[1]]},
-            surfaces={
-                "mount": mount,
-                "tip-face": tip,
-                "outer": [face for face in outside if face not in mount + tip],
-                "cavity": cavity,
-            },
+            regions={"body": [body]},
+            surfaces=cad.named_skin(cad.boundary([body]), "z", self.length),
             markers={"base": ends[:1], "tip": ends[1:], "centreline": seam},
         )

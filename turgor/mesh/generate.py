@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -25,9 +25,6 @@ Progress = Callable[[str], None]
 MOST_CELLS = 3_000_000
 """Meshes beyond this are refused; they need more than ten gigabytes before the first step."""
 
-PER_CIRCLE = 12
-"""Elements along a full circle, at least: longer ones would bulge through a thin wall when they are curved."""
-
 LEAST_DISTORTION = 0.1
 """Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
 _HALVINGS = 4
@@ -37,7 +34,14 @@ _TET10, _TRI6 = 11, 9
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
-def generate(actuator: Actuator, size: float | None = None, *, progress: Progress = LOG.info) -> Mesh:
+def generate(
+    actuator: Actuator,
+    size: float | None = None,
+    *,
+    sizes: Mapping[str, float] | None = None,
+    per_circle: int | None = None,
+    progress: Progress = LOG.info,
+) -> Mesh:
     """Mesh an actuator with curved ten-node tetrahedra, all of them valid.
 
     The same actuator and size give the same mesh to the last bit on the same machine and version of gmsh.
@@ -48,6 +52,11 @@ def generate(actuator: Actuator, size: float | None = None, *, progress: Progres
         What to mesh.
     size
         Largest edge length in mm; left out, the template's own default.
+    sizes
+        Smaller edge lengths in mm, by the name of a region or surface. The template's own local sizes, if it has any,
+        are refined with `size` and hold where none is given here.
+    per_circle
+        Elements along a full circle, at least; 0 lets them be as long as `size`. Left out, the template's own.
     progress
         Called with the name of each stage; the default logs it.
 
@@ -60,19 +69,23 @@ def generate(actuator: Actuator, size: float | None = None, *, progress: Progres
     Raises
     ------
     InputError
-        If the size is not positive, or gmsh finds no valid mesh for this shape and size.
+        If a size is not positive, names nothing or would fill the memory, or if gmsh finds no valid mesh.
     MissingPackageError
         If gmsh or a system library that it loads is absent.
     """
     chosen = actuator.default_size if size is None else size
-    if not (np.isfinite(chosen) and chosen > 0.0):
-        raise InputError("the element size must be positive", key="size", value=chosen)
+    for key, value in {"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}}.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError("the element size must be positive", key=key, value=value)
     with cad.session(actuator.template) as gmsh:
         progress("drawing")
         shape = actuator.draw()
+        scale = min(1.0, chosen / actuator.default_size)
+        local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
+        _set_local_sizes(gmsh, shape, local)
         _check_count(gmsh, chosen)
         progress(f"meshing with elements of {chosen:g} mm")
-        _tetrahedralise(gmsh, chosen)
+        _tetrahedralise(gmsh, chosen, actuator.per_circle if per_circle is None else per_circle)
         progress("curving")
         return _named_mesh(gmsh, shape, _curved(gmsh, shape))
 
@@ -87,6 +100,25 @@ class _Cells:
     index: IntArray
 
 
+def _set_local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float]) -> None:
+    """Limit the size inside named regions and on named surfaces; from their edges it grows outward by itself."""
+    field = gmsh.model.mesh.field
+    limits = []
+    for name, size in sizes.items():
+        if name not in shape.regions and name not in shape.surfaces:
+            expected = "one of: " + ", ".join([*shape.regions, *shape.surfaces])
+            raise InputError("the shape has no region or surface of this name", key=f"sizes.{name}", expected=expected)
+        limit = field.add("Constant")
+        field.setNumber(limit, "VIn", size)
+        field.setNumbers(limit, "VolumesList", shape.regions.get(name, []))
+        field.setNumbers(limit, "SurfacesList", shape.surfaces.get(name, []))
+        limits.append(limit)
+    if limits:
+        smallest = field.add("Min")
+        field.setNumbers(smallest, "FieldsList", limits)
+        field.setAsBackgroundMesh(smallest)
+
+
 def _check_count(gmsh: ModuleType, size: float) -> None:
     """Refuse a size that would fill the memory before anybody could interrupt."""
     volume = sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
@@ -99,9 +131,9 @@ def _check_count(gmsh: ModuleType, size: float) -> None:
         raise InputError(problem, key="size", value=f"{size:g} mm", expected=expected)
 
 
-def _tetrahedralise(gmsh: ModuleType, size: float) -> None:
+def _tetrahedralise(gmsh: ModuleType, size: float, per_circle: int) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", PER_CIRCLE)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", per_circle)
     try:
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")

@@ -1,0 +1,151 @@
+"""The bellows: a wall of one thickness, folded into round-edged convolutions, with an inlet in the bottom."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.units import Angle, PositiveLength
+from turgor.geometry import cad
+from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.path import Piece, Step, offset_path
+
+_ANNEX = "thesis on TPU bellows and membrane actuators, annex 1"
+_ASSUMED = "assumed"
+
+# A flatter flank would meet the plates in arcs too short to mesh, a steeper one make a corrugated tube.
+_FLATTEST, _STEEPEST = math.radians(5), math.radians(75)
+
+
+class Bellows(Actuator):
+    """A body of revolution around z, standing on the plane z = 0, where the inlet opens.
+
+    Surfaces ``mount`` (the ring around the inlet), ``tip-face`` (the flat top), ``outer``, ``cavity`` (inside and wall
+    of the inlet, whose rim lies in the plane z = 0, so that the volume is closed) and, of the quarter model,
+    ``symmetry-x`` and ``symmetry-y`` (the cuts x = 0 and y = 0); region ``body``; markers ``base`` (on the inlet's
+    rim) and ``tip`` (centre of the top).
+    """
+
+    template: ClassVar[str] = "bellows"
+    # The edges' tight arcs are cut across a wall nearly as thick as their radius: shorter elements gain little.
+    per_circle: ClassVar[int] = 8
+
+    convolutions: int = parameter(3, "number of outward folds", _ASSUMED, ge=1, le=30)
+    crest_radius: PositiveLength = parameter("15.73 mm", "outside of the wall at a crest", f"{_ANNEX}: half of C")
+    root_radius: PositiveLength = parameter(
+        "7.1 mm", "outside of the wall at a root", f"{_ANNEX}: chosen so that the height is D, 26.5 mm"
+    )
+    wall: PositiveLength = parameter("1.23 mm", "thickness of the wall everywhere", f"{_ANNEX}: A")
+    rounding: PositiveLength = parameter("1.5 mm", "radius of the wall's middle surface at all edges", f"{_ANNEX}: F")
+    flank_angle: Angle = parameter("16.26 deg", "slope of the flanks against the horizontal", f"{_ANNEX}: E")
+    inlet_radius: PositiveLength = parameter("1.62 mm", "radius of the inlet in the bottom", f"{_ANNEX}: half of B")
+    mount_radius: PositiveLength = parameter("5 mm", "outer radius of the ring that is held", _ASSUMED)
+    quarter: bool = parameter(False, "only the quarter x, y ≥ 0", _ASSUMED)
+
+    @property
+    def default_size(self) -> float:
+        """One element through the wall."""
+        return float(self.wall)
+
+    @property
+    def height(self) -> float:
+        """Overall height in mm."""
+        return float(self._top() + 0.5 * self.wall)
+
+    @property
+    def _crest(self) -> float:
+        """Radius at which the arcs of the crests are centred."""
+        return float(self.crest_radius - 0.5 * self.wall - self.rounding)
+
+    @property
+    def _root(self) -> float:
+        """Radius at which the arcs of the roots and of the plates' edges are centred."""
+        return float(self.root_radius - 0.5 * self.wall + self.rounding)
+
+    def check(self) -> None:
+        """Raise InputError if the wall cannot be folded like this."""
+        depth = self._crest - self._root
+        if self.rounding <= 0.5 * self.wall:
+            self._refuse("rounding", "the wall meets itself inside its bends", f"more than {self.wall / 2:g} mm")
+        if not _FLATTEST <= self.flank_angle <= _STEEPEST:
+            self._refuse("flank_angle", "the flanks cannot slope like this", "5 to 75 deg")
+        if depth <= 0.0:
+            limit = self.crest_radius - 2 * self.rounding
+            self._refuse("root_radius", "the roots leave no room for flanks", f"less than {limit:g} mm")
+        if self._root - self.rounding - 0.5 * self.wall <= 0.0:
+            self._refuse("root_radius", "the walls of the roots meet on the axis", f"more than {self.wall:g} mm")
+        if self.inlet_radius >= self.mount_radius:
+            self._refuse("inlet_radius", "the inlet is wider than its mount", f"less than {self.mount_radius:g} mm")
+        if self.mount_radius >= self._root:
+            self._refuse("mount_radius", "the mount is wider than the flat bottom", f"less than {self._root:g} mm")
+
+    def _refuse(self, key: str, problem: str, expected: str) -> None:
+        value = getattr(self, key)
+        shown = f"{math.degrees(value):g} deg" if key == "flank_angle" else f"{value:g} mm"
+        raise InputError(problem, key=key, value=shown, expected=expected)
+
+    def _steps(self) -> list[Step]:
+        """Return the wall's middle line from the inlet outward, up through the folds and in along the top."""
+        angle, bend = self.flank_angle, math.pi - 2 * self.flank_angle
+        depth = self._crest - self._root
+        outer_flank = depth / math.cos(angle)
+        # Between a crest and a root the flank is a tangent that crosses from one circle's side to the other's.
+        flank = (depth + 2 * self.rounding * math.sin(angle)) / math.cos(angle)
+        fold = [Step(flank, -bend, self.rounding), Step(flank, bend, self.rounding)]
+        return [
+            Step(self._root - self.inlet_radius, angle, self.rounding),
+            Step(outer_flank, bend, self.rounding),
+            *(fold * (self.convolutions - 1)),
+            Step(outer_flank, angle, self.rounding),
+            Step(self._root),
+        ]
+
+    def _line(self, distance: float) -> list[Piece]:
+        return offset_path((self.inlet_radius, 0.5 * self.wall), self._steps(), distance)
+
+    def _top(self) -> float:
+        """Height of the middle line of the top."""
+        return self._line(0.0)[-1].end[1]
+
+    def draw(self) -> Shape:
+        """Draw the wall's section in the plane y = 0 and turn it around z."""
+        occ = cad.occ()
+        outside, inside = self._line(-0.5 * self.wall), self._line(0.5 * self.wall)
+        outside[:1] = [
+            Piece(outside[0].start, (self.mount_radius, 0.0)),
+            Piece((self.mount_radius, 0.0), outside[0].end),
+        ]
+        section = cad.plane_face(
+            [
+                *outside,
+                Piece(outside[-1].end, inside[-1].end),
+                *(Piece(piece.end, piece.start, piece.centre) for piece in reversed(inside)),
+                Piece(inside[0].start, outside[0].start),
+            ]
+        )
+        turn = 0.5 * math.pi if self.quarter else 2.0 * math.pi
+        swept = occ.revolve([(2, section)], 0, 0, 0, 0, 0, 1, turn)
+        occ.remove([(2, section)])
+        tip = np.array([[0.0, 0.0, self.height]])
+        body = cad.with_points(next(tag for dimension, tag in swept if dimension == 3), tip)
+        surfaces = self._surfaces(cad.boundary([body]))
+        base = np.array([[self.inlet_radius, 0.0, 0.0]])
+        return Shape(regions={"body": [body]}, surfaces=surfaces, markers={"base": base, "tip": tip})
+
+    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
+        cuts = {f"symmetry-{axis}": cad.faces_in_plane(faces, axis, 0.0) for axis in "xy" if self.quarter}
+        bottom = cad.faces_in_plane(faces, "z", 0.0)
+        cut = {face for tags in cuts.values() for face in tags}
+        outside, cavity = cad.skins([face for face in faces if face not in cut and face not in bottom])
+        reach = self.mount_radius * (1 + 1e-6)
+
+        def is_ring(low: Any, high: Any) -> bool:
+            return bool(max(high[:2]) < reach)
+
+        mount = cad.faces_where(bottom, is_ring)
+        tip = cad.faces_in_plane(outside, "z", self.height)
+        outer = [face for face in outside + bottom if face not in tip + mount]
+        return {"mount": mount, "tip-face": tip, "outer": outer, "cavity": cavity, **cuts}

@@ -1,0 +1,118 @@
+"""The fibre tube: a capped tube of two layers with fibres wound between them on standard or tilted helices."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.units import Angle, PositiveLength
+from turgor.geometry import cad
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+
+_THESIS = "thesis on tilted-helix actuators, section 2.2"
+_ASSUMED = "assumed"
+
+_POINTS_PER_TURN = 72
+
+
+class FibreTube(Actuator):
+    """A capped tube along z from the mount at z = 0; fibres run on the surface between its layers.
+
+    Fibre k of n follows x = r cos t, y = ±r sin t, z = p t / 2π + A cos t, shifted along z by k p / n and clipped to
+    the fibre length in the middle of the tube; A = r tan α (Geer, 2019, eqs. 1–5). Where a tilted helix leaves that
+    length and enters it again, each part is a curve of its own.
+
+    Regions ``inner-layer`` (with the caps) and ``outer-layer``; surfaces ``mount``, ``tip-face``, ``outer`` and
+    ``cavity``; curves ``fibre-1``, ``fibre-2``, … (parts: ``fibre-1-2``, …); markers ``base`` and ``tip`` (centres of
+    the end faces) and ``centreline`` (along the outside at y = 0, x > 0).
+    """
+
+    template: ClassVar[str] = "fibre-tube"
+
+    inner_diameter: PositiveLength = parameter("12.7 mm", "diameter of the cavity", _THESIS)
+    inner_layer: PositiveLength = parameter("1.7 mm", "thickness inside the fibres", _THESIS)
+    outer_layer: PositiveLength = parameter("1.8 mm", "thickness outside the fibres", _THESIS)
+    length: PositiveLength = parameter("339 mm", "length, caps included", _THESIS)
+    cap: PositiveLength = parameter("17 mm", "thickness of either end cap", _THESIS)
+    fibre_length: PositiveLength = parameter("305 mm", "part of the length that has fibres", _THESIS)
+    fibres: int = parameter(2, "number of fibres", _THESIS, ge=1, le=64)
+    pitch: PositiveLength = parameter("15 mm", "rise of a fibre in one turn", "assumed: the thesis prints none")
+    tilt: Angle = parameter("51 deg", "tilt of the helix; 0 is a standard one", f"{_THESIS}: 41, 51 and 61 deg")
+    winding: Literal["left", "right", "both"] = parameter(
+        "right", "sense: 'right' turns anticlockwise as it rises, 'both' alternates from fibre to fibre", _ASSUMED
+    )
+
+    @property
+    def default_size(self) -> float:
+        """One element, not quite twice as long as thick, through each layer."""
+        return float(1.75 * min(self.inner_layer, self.outer_layer))
+
+    @property
+    def fibre_radius(self) -> float:
+        """Radius of the surface between the layers in mm."""
+        return float(0.5 * self.inner_diameter + self.inner_layer)
+
+    def check(self) -> None:
+        """Raise InputError if caps or fibres do not fit the tube."""
+        if 2.0 * self.cap >= self.length:
+            expected = f"less than half of the length, {self.length / 2:g} mm"
+            raise InputError("the caps meet: no cavity is left", key="cap", value=f"{self.cap:g} mm", expected=expected)
+        if self.fibre_length > self.length:
+            value, expected = f"{self.fibre_length:g} mm", f"at most {self.length:g} mm"
+            raise InputError("the fibres are longer than the tube", key="fibre_length", value=value, expected=expected)
+        if not 0.0 <= self.tilt <= math.radians(75):
+            value = f"{math.degrees(self.tilt):g} deg"
+            raise InputError("no fibre stays on the tube at this tilt", key="tilt", value=value, expected="0 to 75 deg")
+        if not self._curves():
+            value, expected = f"{self.fibre_length:g} mm", "a longer part of the tube"
+            raise InputError("no fibre fits on this length", key="fibre_length", value=value, expected=expected)
+
+    def draw(self) -> Shape:
+        """Draw the two layers with their common surface, and list the fibres."""
+        occ = cad.occ()
+        inside, between = 0.5 * self.inner_diameter, self.fibre_radius
+        outside = between + self.outer_layer
+        air = cad.cylinder(self.cap, self.length - self.cap, inside)
+        (inner,), _ = occ.cut([cad.cylinder(0.0, self.length, between)], [air])
+        hole = cad.cylinder(0.0, self.length, between)
+        (outer,), _ = occ.cut([cad.cylinder(0.0, self.length, outside)], [hole])
+        ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        _, pieces = occ.fragment([inner, outer], [(0, occ.addPoint(*end)) for end in ends])
+        occ.synchronize()
+        regions = {
+            name: [tag for _, tag in pieces[number]] for number, name in enumerate(("inner-layer", "outer-layer"))
+        }
+        tags = [tag for piece in regions.values() for tag in piece]
+        return Shape(
+            regions=regions,
+            surfaces=cad.named_skin(cad.boundary(tags), "z", self.length),
+            markers={"base": ends[:1], "tip": ends[1:], "centreline": ends + np.array([outside, 0.0, 0.0])},
+            curves=self._curves(),
+        )
+
+    def _curves(self) -> dict[str, FloatArray]:
+        curves = {}
+        for number in range(self.fibres):
+            sense = {"right": 1, "left": -1, "both": 1 - 2 * (number % 2)}[self.winding]
+            for part, points in enumerate(self._parts(number, sense), start=1):
+                curves[f"fibre-{number + 1}" + (f"-{part}" if part > 1 else "")] = points
+        return curves
+
+    def _parts(self, number: int, sense: int) -> list[FloatArray]:
+        """Return the parts of one fibre inside its length, the longest first."""
+        radius, amplitude = self.fibre_radius, self.fibre_radius * math.tan(self.tilt)
+        low = 0.5 * (self.length - self.fibre_length)
+        shift = self.pitch * number / self.fibres
+        first = math.floor((-amplitude - shift) / self.pitch)
+        last = math.ceil((self.fibre_length + amplitude - shift) / self.pitch)
+        turn = 2.0 * math.pi * np.linspace(first, last, (last - first) * _POINTS_PER_TURN + 1)
+        height = self.pitch * turn / (2.0 * math.pi) + amplitude * np.cos(turn) + shift
+        points = np.column_stack([radius * np.cos(turn), sense * radius * np.sin(turn), low + height])
+        inside = (height >= 0.0) & (height <= self.fibre_length)
+        changes = np.flatnonzero(np.diff(inside.astype(np.int8))) + 1
+        runs = [run for run in np.split(np.arange(len(turn)), changes) if inside[run[0]] and len(run) > 2]
+        runs.sort(key=len, reverse=True)
+        return [points[run] for run in runs]

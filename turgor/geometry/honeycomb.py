@@ -1,0 +1,144 @@
+"""The pneumatic honeycomb network: columns and rows of flat hexagonal cells with walls of one thickness."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.units import PositiveLength
+from turgor.geometry import cad
+from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.path import rounded_polygon
+
+_PAPER = "honeycomb network paper, section 3.1"
+_ASSUMED = "assumed"
+
+Corners = list[tuple[float, float]]
+
+
+class Honeycomb(Actuator):
+    """Hexagonal cells in the plane of x and z, closed by end walls along y; middle plane y = 0, bottom z = 0.
+
+    Cells of a column share the walls between them; neighbouring columns meet at the corners of their cells. The rooms
+    between four cells are open to the outside.
+
+    Region ``body``; surfaces ``mount`` (the flats at the bottom), ``tip-face`` (those on top), ``cavity-1``,
+    ``cavity-2``, … (all cells of the first, second, … column along x, which share one pressure), ``outer`` and, of the
+    half model, ``symmetry``; markers ``base`` and ``tip`` (middle of the middle column's bottom and top at y = 0).
+    """
+
+    template: ClassVar[str] = "honeycomb"
+    # Roundings of a millimetre along metres of corners: finer arcs would cost ten times the elements.
+    per_circle: ClassVar[int] = 3
+
+    columns: int = parameter(3, "number of cells along x", _PAPER, ge=1, le=20)
+    rows: int = parameter(3, "number of cells along z", _PAPER, ge=1, le=20)
+    web_length: PositiveLength = parameter(
+        "30 mm", "flat of a cell along x, between corners of its middle line", f"{_PAPER}: L1"
+    )
+    cell_width: PositiveLength = parameter(
+        "55 mm", "cell along x from corner to corner of its middle line", f"{_PAPER}: Lges"
+    )
+    cell_height: PositiveLength = parameter("10 mm", "distance between the flats' middles", f"{_PAPER}: H")
+    thickness: PositiveLength = parameter("1 mm", "thickness of all walls in the plane", f"{_PAPER}: d")
+    rounding: PositiveLength = parameter("0.5 mm", "radius of all corners", f"{_PAPER} ties it to d; half of d assumed")
+    depth: PositiveLength = parameter("20 mm", "extent along y, end walls included", _ASSUMED)
+    end_wall: PositiveLength = parameter("1 mm", "thickness of the walls that close the cells along y", _ASSUMED)
+    symmetric: bool = parameter(False, "only the half y ≥ 0, with the surface 'symmetry'", _ASSUMED)
+
+    @property
+    def default_size(self) -> float:
+        """One flat element through the walls, twice as long as thick."""
+        return float(2.0 * min(self.thickness, self.end_wall))
+
+    @property
+    def height(self) -> float:
+        """Overall height in mm."""
+        return float(self.rows * self.cell_height + self.thickness)
+
+    @property
+    def _shoulder(self) -> float:
+        """Extent along x of the slanted part at either end of a cell."""
+        return float(0.5 * (self.cell_width - self.web_length))
+
+    def check(self) -> None:
+        """Raise InputError if the flats are longer than the cells, or walls or roundings leave no room."""
+        if self.web_length >= self.cell_width:
+            limit, value = f"less than {self.cell_width:g} mm", f"{self.web_length:g} mm"
+            raise InputError("the flat is longer than its cell", key="web_length", value=value, expected=limit)
+        if 2 * self.end_wall >= self.depth:
+            limit, value = f"less than {self.depth / 2:g} mm", f"{self.end_wall:g} mm"
+            raise InputError("the end walls meet: no cavity is left", key="end_wall", value=value, expected=limit)
+        for radius, key in ((0.0, "thickness"), (self.rounding, "rounding")):
+            try:
+                for corners, inset in self._outlines():
+                    rounded_polygon(corners, inset, radius)
+            except InputError as error:
+                raise InputError(error.problem, key=key, value=f"{getattr(self, key):g} mm", expected="less") from None
+
+    def _outlines(self) -> list[tuple[Corners, float]]:
+        """Return middle lines and insets of the outside, one cell and one room between four cells."""
+        half = 0.5 * self.thickness
+        return [(self._outside(), -half), (self._cell(0, 0), half), (self._room(1, 1), half)]
+
+    def _cell(self, column: int, row: int) -> Corners:
+        left, bottom = column * self.cell_width, 0.5 * self.thickness + row * self.cell_height
+        x = (left, left + self._shoulder, left + self._shoulder + self.web_length, left + self.cell_width)
+        z = (bottom, bottom + 0.5 * self.cell_height, bottom + self.cell_height)
+        return [(x[0], z[1]), (x[1], z[0]), (x[2], z[0]), (x[3], z[1]), (x[2], z[2]), (x[1], z[2])]
+
+    def _room(self, column: int, row: int) -> Corners:
+        """Return the room whose left and right neighbours are columns, lower and upper ones rows."""
+        x, z = column * self.cell_width, 0.5 * self.thickness + row * self.cell_height
+        across, up = self._shoulder, 0.5 * self.cell_height
+        return [(x - across, z), (x, z - up), (x + across, z), (x, z + up)]
+
+    def _outside(self) -> Corners:
+        """Return the middle line of the walls around the whole network, anticlockwise from the lower left."""
+        columns, rows = range(self.columns), range(self.rows)
+        below = [corner for column in columns for corner in self._cell(column, 0)[1:4]]
+        right = [corner for row in rows for corner in self._cell(columns[-1], row)[3:5]]
+        turned = [self._cell(column, rows[-1]) for column in reversed(columns)]
+        above = [corner for cell in turned for corner in (cell[4], cell[5], cell[0])]
+        left = [corner for row in reversed(rows) for corner in self._cell(0, row)[:2]]
+        # Each side begins where the one before ended, and the last ends where the first began.
+        return [*below, *right[1:], *above[1:], *left[1:-1]]
+
+    def draw(self) -> Shape:
+        """Sweep the outside with its open rooms along y and cut the cells out of it."""
+        occ = cad.occ()
+        half, radius = 0.5 * self.thickness, self.rounding
+        begin, end = (0.0 if self.symmetric else -0.5 * self.depth), 0.5 * self.depth
+        rooms = [
+            rounded_polygon(self._room(column, row), half, radius)
+            for column in range(1, self.columns)
+            for row in range(1, self.rows)
+        ]
+        solid = cad.sweep(cad.plane_face(rounded_polygon(self._outside(), -half, radius), *rooms), (0, end - begin, 0))
+        occ.translate([(3, solid)], 0, begin, 0)
+        front = begin if self.symmetric else begin + self.end_wall
+        air = []
+        for column in range(self.columns):
+            for row in range(self.rows):
+                face = cad.plane_face(rounded_polygon(self._cell(column, row), half, radius))
+                air.append((3, cad.sweep(face, (0, end - self.end_wall - front, 0))))
+        occ.translate(air, 0, front, 0)
+        (body,), _ = occ.cut([(3, solid)], air)
+        middle = (self.columns // 2 + 0.5) * self.cell_width
+        ends = np.array([[middle, 0.0, 0.0], [middle, 0.0, self.height]])
+        body = cad.with_points(body[1], ends)
+        return Shape({"body": [body]}, self._surfaces(cad.boundary([body])), {"base": ends[:1], "tip": ends[1:]})
+
+    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
+        symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.symmetric else []
+        outside, *cells = cad.skins([face for face in faces if face not in symmetry])
+        mount, tip = (cad.faces_in_plane(outside, "z", z) for z in (0.0, self.height))
+        columns: dict[str, list[int]] = {f"cavity-{number + 1}": [] for number in range(self.columns)}
+        for cell in cells:
+            left = min(cad.bounds(2, face)[0][0] for face in cell)
+            columns[f"cavity-{int(left // self.cell_width) + 1}"] += cell
+        outer = [face for face in outside if face not in mount + tip]
+        named = {"mount": mount, "tip-face": tip, "outer": outer, **columns, "symmetry": symmetry}
+        return {name: tags for name, tags in named.items() if tags}
