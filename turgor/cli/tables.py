@@ -13,7 +13,7 @@ import turgor as tg
 
 if TYPE_CHECKING:
     from turgor.geometry.actuator import Actuator
-    from turgor.materials.fit import FitReport
+    from turgor.materials.fit_result import FitReport
     from turgor.materials.library import LibraryEntry
 
 

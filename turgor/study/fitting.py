@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from turgor.common.errors import InputError
-from turgor.materials.fit import FitReport
+from turgor.materials.fit_result import FitReport
 from turgor.materials.least_squares import predict
 from turgor.results.plots import stress_strain
 

@@ -13,7 +13,8 @@ from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.common.units import Compliance, Density, PositivePressure, to_internal
 from turgor.materials import Hyperelastic, create, find_model
-from turgor.materials.fit import FitReport, fit, parse_strain_range
+from turgor.materials.fit import fit, parse_strain_range
+from turgor.materials.fit_result import FitReport
 from turgor.materials.library import find
 from turgor.study.validation import StrictModel, collected, invalid, under
 
