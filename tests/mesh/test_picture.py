@@ -1,0 +1,31 @@
+import matplotlib.image
+import numpy as np
+import pytest
+
+from turgor.common.errors import InputError
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.picture import save_picture
+from turgor.mesh.structured import box
+
+
+@pytest.fixture
+def block():
+    plain = box((3.0, 1.0, 1.0), (3, 1, 1))
+    surfaces = {"mount": plain.surface("x0"), "tip-face": plain.surface("x1"), "outer": plain.surface("y0")}
+    fibre = np.array([[0.0, 0.1, 0.5], [3.0, 0.1, 0.5]])
+    return Mesh(plain.points, plain.cells, surfaces=surfaces, markers={"tip": [0]}, curves={"fibre-1": fibre})
+
+
+@pytest.mark.parametrize("show", ["names", "quality"])
+def test_the_picture_shows_the_body(block, show, tmp_path):
+    path = tmp_path / "block.png"
+    save_picture(block, path, show=show)
+    pixels = matplotlib.image.imread(path)
+    assert pixels.shape[:2] == (900, 1400)
+    drawn = (pixels[..., :3] < 0.98).any(axis=-1)
+    assert 0.05 < drawn.mean() < 0.9
+
+
+def test_only_png(block, tmp_path):
+    with pytest.raises(InputError, match=r"saved as \.png"):
+        save_picture(block, tmp_path / "block.jpg")

@@ -1,0 +1,102 @@
+"""Pictures of a mesh: its named surfaces in colours, or the quality of its elements with the worst one marked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.optional import require
+from turgor.mesh.faces import boundary_faces, host_cells
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.quality import quality
+from turgor.mesh.tet10 import IntArray
+
+COLOURS = {
+    "mount": "#444444",
+    "tip-face": "#c8553d",
+    "outer": "#9aa5b1",
+    "symmetry": "#d9b44a",
+    "cavity": "#5b9bd5",
+}
+"""Colour of a surface by the beginning of its name; others are grey."""
+
+_VTK_QUADRATIC_TRIANGLE = 22
+_EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity": 0.25}
+
+
+def save_picture(
+    mesh: Mesh, path: str | Path, *, show: Literal["names", "quality"] = "names", cut: bool = False
+) -> None:
+    """Draw the skin of a mesh with its elements' edges and save it as a PNG file.
+
+    Parameters
+    ----------
+    mesh
+        What to draw.
+    path
+        Ends in .png.
+    show
+        Colours by surface ``names`` with fibres and markers, or the ``quality`` (scaled Jacobian) of the element behind
+        each face, with the place of the worst element.
+    cut
+        Draw only the faces whose element lies at y > 0 of the middle, to look inside.
+
+    Raises
+    ------
+    InputError
+        If the path does not end in .png.
+    MissingPackageError
+        If pyvista or a system library that it loads is absent.
+    """
+    if Path(path).suffix != ".png":
+        raise InputError("a picture is saved as .png", key="path", value=str(path))
+    pyvista = require("pyvista")
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 900))
+    plotter.set_background("white")
+    middle = mesh.points[:, 1].min() if not cut else float(mesh.points[:, 1].mean())
+    surfaces = dict(mesh.surfaces) if show == "names" else {"skin": boundary_faces(mesh.cells)}
+    measured = quality(mesh)
+    for name, triangles in surfaces.items():
+        kept = triangles[mesh.points[triangles].mean(axis=1)[:, 1] >= middle]
+        if len(kept) == 0:
+            continue
+        skin = _skin(pyvista, mesh, kept)
+        if show == "quality":
+            skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[host_cells(mesh.cells, kept)]
+            plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **_EDGES)
+        else:
+            # Fibres run inside the wall; they show through the outside.
+            opacity = 0.3 if mesh.curves and name == "outer" else 1.0
+            plotter.add_mesh(skin, color=_colour(name), label=name, opacity=opacity, **_EDGES)
+    if show == "quality":
+        worst = measured.centres[measured.worst_cell]
+        plotter.add_point_labels([worst], [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
+    else:
+        _add_lines(pyvista, plotter, mesh)
+        plotter.add_legend(bcolor="white", size=(0.16, 0.2))
+    plotter.view_vector((0.5, -1.0, 0.45), (0, 0, 1))
+    plotter.camera.zoom(1.3)
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def _skin(pyvista: Any, mesh: Mesh, triangles: IntArray) -> Any:
+    cells = np.hstack([np.full((len(triangles), 1), 6), triangles]).ravel()
+    return pyvista.UnstructuredGrid(cells, np.full(len(triangles), _VTK_QUADRATIC_TRIANGLE), mesh.points)
+
+
+def _add_lines(pyvista: Any, plotter: Any, mesh: Mesh) -> None:
+    for curve in mesh.curves.values():
+        plotter.add_mesh(pyvista.lines_from_points(curve), color="#8b1a1a", line_width=3)
+    for name, nodes in mesh.markers.items():
+        size = 6 if len(nodes) > 1 else 16
+        plotter.add_points(mesh.points[nodes], color="#117733", point_size=size, render_points_as_spheres=True)
+        if len(nodes) == 1:
+            plotter.add_point_labels(mesh.points[nodes], [name], always_visible=True, shape_opacity=0.6)
+
+
+def _colour(name: str) -> str:
+    return next((colour for start, colour in COLOURS.items() if name.startswith(start)), "#aaaaaa")
