@@ -158,9 +158,17 @@ def schema() -> None:
 
 
 @app.command()
-def doctor(as_json: AsJson = False) -> None:
+def doctor(
+    as_json: AsJson = False,
+    missing_packages: Annotated[
+        bool, typer.Option("--missing-packages", help="Print only the Debian packages that are missing, for scripts.")
+    ] = False,
+) -> None:
     """Say what Turgor stands on here: versions, threads, linear solver, and what is missing."""
     found = tg.environment()
+    if missing_packages:
+        print_text(" ".join(found["debian_packages"]))
+        return
     if as_json:
         print_json(found)
     else:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import importlib.util
+import sys
 from types import ModuleType
 
 from turgor.common.errors import MissingPackageError
@@ -50,8 +52,21 @@ def require(name: str, purpose: str | None = None) -> ModuleType:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         raise MissingPackageError(f"{why} needs the package '{name}': pip install {name}") from error
-    except OSError as error:
+    except (ImportError, OSError) as error:
         raise MissingPackageError(f"{why} needs a system library: {library_advice(str(error))}") from error
+
+
+def missing_debian_packages() -> list[str]:
+    """Return the Debian packages whose libraries gmsh and VTK need and this Linux system lacks; elsewhere none."""
+    if sys.platform != "linux":
+        return []
+    missing = []
+    for library, package in DEBIAN_PACKAGES.items():
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            missing.append(package)
+    return missing
 
 
 def library_advice(message: str) -> str:

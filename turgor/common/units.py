@@ -113,7 +113,7 @@ def to_text(number: float, dimension: str, unit: str | None = None) -> str:
 
 
 _QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf))\s*(?P<unit>[^\d\s+-].{0,40})?\s*"
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf))\s*(?P<unit>(?:1\s*/\s*)?[^\d\s.+-].{0,40})?\s*"
 )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 
 from turgor.common.errors import MissingPackageError
-from turgor.common.optional import OPTIONAL, require
+from turgor.common.optional import OPTIONAL, missing_debian_packages, require
 from turgor.results.summary import versions
 from turgor.solver.linear import solver_in_use
 
@@ -25,7 +25,7 @@ def environment() -> dict[str, Any]:
     dict
         ``versions`` of Turgor, Python and the packages; ``platform``; ``threads`` (cores of the machine, threads that
         the element kernels use); ``linear_solver``; ``missing``, a list of sentences that name what is absent and
-        how to get it, empty where nothing is.
+        how to get it, empty where nothing is; ``debian_packages``, those of them that are packages of Debian.
     """
     missing = []
     for package in OPTIONAL:
@@ -33,12 +33,16 @@ def environment() -> dict[str, Any]:
             require(package)
         except MissingPackageError as error:
             missing.append(str(error))
+    packages = missing_debian_packages()
+    if packages:
+        missing.append(f"system libraries are missing; on Debian or Ubuntu: apt-get install {' '.join(packages)}")
     return {
         "versions": versions() | _versions(_SHOWN),
         "platform": platform.platform(),
         "threads": {"cores": os.cpu_count(), "kernels": numba.get_num_threads()},
         "linear_solver": solver_in_use().name,
         "missing": missing,
+        "debian_packages": packages,
     }
 
 
