@@ -19,8 +19,13 @@ from turgor.materials.inequalities import Limits
 from turgor.materials.kinematics import Array
 from turgor.materials.measurement import MaterialTest
 
-STARTS_POLISHED = 5
-"""So many of the best starts are followed to their minimum."""
+STARTS_FOLLOWED = 10
+"""So many of the best starts are followed to a minimum on the thinned tests (fewer where limits make that slow)."""
+
+STARTS_LIMITED = 5
+
+MINIMA_POLISHED = 3
+"""So many of the best minima are followed on all points."""
 
 SCREENING_POINTS = 40
 """Starts are compared on so many points of each test."""
@@ -202,10 +207,13 @@ def _search(model: type[Hyperelastic], linear: _Linear) -> Array:
     low, high = linear.searched_bounds
     starts = list(dict.fromkeys(tuple(np.clip(start, low, high)) for start in model.starts()))
     costs = [float(np.sum(coarse.residual(np.array(start)) ** 2)) for start in starts]
-    chosen = [starts[i] for i in np.argsort(costs, kind="stable")[:STARTS_POLISHED]]
-    minima = [_descend(coarse, start, 1e-6, "2-point") for start in chosen]
-    nearest = min(minima, key=lambda found: float(found.cost))
-    return np.asarray(_descend(linear, nearest.x, 1e-15, "3-point").x, dtype=float)
+    followed = STARTS_FOLLOWED if linear.limits is None else STARTS_LIMITED
+    chosen = [starts[i] for i in np.argsort(costs, kind="stable")[:followed]]
+    minima = sorted((_descend(coarse, start, 1e-6, "2-point") for start in chosen), key=lambda found: float(found.cost))
+    distinct = [m for i, m in enumerate(minima) if i == 0 or m.cost > minima[i - 1].cost * (1.0 + 1e-4)]
+    closer = [_descend(linear, found.x, 1e-9, "2-point") for found in distinct[:MINIMA_POLISHED]]
+    best = min(closer, key=lambda found: float(found.cost))
+    return np.asarray(_descend(linear, best.x, 1e-15, "3-point").x, dtype=float)
 
 
 def _descend(linear: _Linear, start: Sequence[float] | Array, tolerance: float, jacobian: str) -> OptimizeResult:

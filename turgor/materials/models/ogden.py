@@ -15,6 +15,8 @@ from turgor.materials.kinematics import IDENTITY, Array
 
 _STARTS = (-12.0, -6.0, -3.0, -1.5, 0.5, 1.5, 2.5, 4.0, 6.0, 9.0, 14.0)
 _RANGE = (-40.0, 40.0)
+_LIMIT = 1e-7
+"""Exponents below it, which only the search of a fit meets, are taken for zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +38,10 @@ class OgdenModel(StretchModel):
     @classmethod
     @override
     def starts(cls) -> list[tuple[float, ...]]:
-        # The terms can be exchanged, and two equal exponents are one term.
-        return list(itertools.combinations(_STARTS, cls.terms))
+        # The terms can be exchanged. Two terms of nearly one exponent act like λ^α ln λ, a form that some data ask for.
+        apart = list(itertools.combinations(_STARTS, cls.terms))
+        others = itertools.combinations(_STARTS, cls.terms - 1) if cls.terms > 1 else []
+        return apart + [(*rest, 1.1 * rest[-1]) for rest in others]
 
     @property
     @override
@@ -45,7 +49,8 @@ class OgdenModel(StretchModel):
         return float(sum(mu for mu, _ in self._terms()))
 
     def _terms(self) -> list[tuple[float, float]]:
-        return [(getattr(self, f"mu{i}"), getattr(self, f"alpha{i}")) for i in range(1, self.terms + 1)]
+        pairs = [(getattr(self, f"mu{i}"), getattr(self, f"alpha{i}")) for i in range(1, self.terms + 1)]
+        return [pair for pair in pairs if pair[0] != 0.0]
 
     @override
     def derivatives(self, stretches: Array) -> tuple[Array, Array, Array]:
@@ -53,6 +58,11 @@ class OgdenModel(StretchModel):
         W = np.zeros(stretches.shape[:-1])
         slope, diagonal = np.zeros_like(stretches), np.zeros_like(stretches)
         for mu, alpha in self._terms():
+            if abs(alpha) < _LIMIT:  # isochoric: Σ ln λ̄ = 0, and the term tends to μ Σ (ln λ̄)²
+                W = W + mu * (logarithm**2).sum(axis=-1)
+                slope += 2.0 * mu * logarithm / stretches
+                diagonal += 2.0 * mu * (1.0 - logarithm) / stretches**2
+                continue
             # expm1 keeps the energy accurate near the undeformed state.
             W = W + 2.0 * mu / alpha**2 * np.expm1(alpha * logarithm).sum(axis=-1)
             power = 2.0 * mu / alpha * np.exp((alpha - 2.0) * logarithm)

@@ -1,0 +1,75 @@
+"""Compressible materials: free lateral faces, lateral strain in the fit, volumetric tests."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from turgor.common.errors import InputError
+from turgor.materials import create
+from turgor.materials.compressible import free_response
+from turgor.materials.fit import fit
+from turgor.materials.measurement import MaterialTest
+
+HYDROGEL = create("neo-hookean", {"C10": 1.343e-2}, D1=30.461)
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "planar"])
+def test_free_faces_carry_no_stress(mode):
+    x = np.linspace(0.7, 2.0, 9)
+    lateral, stress = free_response(HYDROGEL, mode, x)
+    second = {"uniaxial": lateral, "equibiaxial": x, "planar": np.ones_like(x)}[mode]
+    P = HYDROGEL.stress(np.stack([x, second, lateral], axis=-1)[:, :, None] * np.eye(3))
+    np.testing.assert_allclose(P[:, 2, 2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(P[:, 0, 0], stress, atol=1e-12)
+
+
+def test_small_strain_has_the_stated_poisson_ratio():
+    lateral, stress = free_response(HYDROGEL, "uniaxial", np.array([1.0 + 1e-5]))
+    assert (1.0 - lateral[0]) / 1e-5 == pytest.approx(HYDROGEL.poisson_ratio, rel=1e-4)
+    assert stress[0] / 1e-5 == pytest.approx(HYDROGEL.young_modulus, rel=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "planar"])
+def test_nearly_incompressible_is_the_incompressible_response(mode):
+    material = create("yeoh-2", {"C10": 0.1, "C20": 0.01}, bulk_modulus=1e6)
+    x = np.linspace(0.8, 2.0, 7)
+    _, stress = free_response(material, mode, x)
+    np.testing.assert_allclose(stress, getattr(material, mode)(x), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "constants"), [("neo-hookean", {"C10": 0.0134}), ("ogden-1", {"mu1": 0.03, "alpha1": 3})]
+)
+@pytest.mark.parametrize("poisson", [0.32, 0.45])
+def test_lateral_strain_gives_poisson_ratio(name, constants, poisson):
+    material = create(name, constants, poisson=poisson)
+    x = np.linspace(1.0, 1.8, 25)
+    lateral, stress = free_response(material, "uniaxial", x)
+    report = fit(MaterialTest("uniaxial", x, stress, lateral=lateral), name)
+    found = report.fits[0]
+    assert found.parameters == pytest.approx(constants, rel=1e-6)
+    assert found.material.poisson_ratio == pytest.approx(poisson, rel=1e-6)
+    assert found.residual_norm < 1e-8
+    assert "Poisson" in found.remark
+
+
+def test_volumetric_test_gives_the_bulk_modulus():
+    rubber = create("neo-hookean", {"C10": 0.1}, bulk_modulus=800.0)
+    x, J = np.linspace(1.0, 2.0, 20), np.linspace(0.98, 1.0, 10)
+    tests = [
+        MaterialTest("uniaxial", x, rubber.uniaxial(x)),
+        MaterialTest("volumetric", J, rubber.volumetric.pressure(J)),
+    ]
+    found = fit(tests, "neo-hookean").best
+    assert found.bulk_modulus == pytest.approx(800.0)
+    assert found.parameters["C10"] == pytest.approx(0.1)
+
+
+def test_volumetric_test_alone_or_wrong_way_round_is_refused():
+    J = np.linspace(0.98, 1.0, 10)
+    with pytest.raises(InputError, match="volumetric"):
+        fit(MaterialTest("volumetric", J, 800.0 * (J - 1)), "neo-hookean")
+    x = np.linspace(1.0, 2.0, 20)
+    tests = [MaterialTest("uniaxial", x, x - x**-2), MaterialTest("volumetric", J, -800.0 * (J - 1))]
+    assert "bulk modulus" in fit(tests, "neo-hookean").fits[0].remark
