@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from turgor.fem.frames import block_products
+from turgor.fem.pattern import packed_size
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.materials.models.neo_hookean import NeoHookean
@@ -26,3 +29,31 @@ def random_state(system: System, size: float, seed: int = 0, fraction: float = 0
 
 def shifted(state: State, direction: np.ndarray, step: float) -> State:
     return replace(state, u=state.u + step * direction)
+
+
+def differences(function, state, direction, step=1e-5):
+    """Fourth-order central difference of `function` along `direction`."""
+    f = [function(shifted(state, direction, k * step)) for k in (1, -1, 2, -2)]
+    return (8 * (f[0] - f[1]) - (f[2] - f[3])) / (12 * step)
+
+
+def check_derivatives(term, state):
+    """Compare force and stiffness with differences of energy and force; neither may vanish."""
+    direction = np.random.default_rng(7).standard_normal(state.u.shape)
+
+    def force(at):
+        out = np.zeros(state.u.shape)
+        term.force(at, out)
+        return out
+
+    slope = np.vdot(force(state), direction)
+    assert abs(slope) > 1e-8
+    assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-7)
+
+    packed = np.empty((len(term.nodes), packed_size(3 * term.nodes.shape[1])))
+    term.stiffness(state, term.lagged_at(state.u), packed)
+    product = np.zeros(state.u.shape)
+    block_products(term.nodes, packed, direction, product)
+    expected = differences(force, state, direction)
+    assert np.linalg.norm(product - expected) <= 1e-8 * np.linalg.norm(force(state)) + 1e-8 * np.linalg.norm(expected)
+    return np.linalg.norm(expected)

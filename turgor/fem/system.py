@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from turgor.common.errors import InputError
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints
+from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
@@ -38,6 +39,8 @@ class System:
         What holds the body.
     loads
         What acts on it; each has one value in ``State.loads``, named in :attr:`load_names`.
+    reinforcements
+        What is embedded in the body or laid on it.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class System:
         materials: Mapping[str, Hyperelastic],
         supports: Sequence[Support] = (),
         loads: Sequence[Load] = (),
+        reinforcements: Sequence[Fibre] = (),
     ) -> None:
         prefer_light_threads()
         self.mesh = mesh
@@ -65,7 +69,8 @@ class System:
         check_held(mesh, self.constraints, springs)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead)
+        self.fibres = [EmbeddedFibre(mesh, fibre) for fibre in reinforcements]
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *self.fibres)
         self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead)
 
         free = ~self.constraints.fixed.ravel()

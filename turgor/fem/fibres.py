@@ -1,0 +1,212 @@
+"""Fibres: bars along curves that run through the cells without belonging to their nodes."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from turgor.common.errors import InputError
+from turgor.fem.elements import TET10
+from turgor.fem.kernels import parallel
+from turgor.fem.locate import locate
+from turgor.fem.state import State
+from turgor.fem.term import add_at_nodes
+from turgor.mesh.mesh import Mesh
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+BARS_PER_EDGE = 2.0
+"""Default number of bars along the mean edge of the cells that a fibre passes."""
+
+CORNER = np.cos(np.radians(20.0))
+"""A curve that turns more at one of its points has a corner there, which stays a joint of two bars."""
+
+
+@dataclass(frozen=True)
+class Fibre:
+    """A thread along a named curve of the mesh, bonded to the body along its whole length.
+
+    Attributes
+    ----------
+    curve
+        Name of the curve.
+    youngs_modulus
+        E in MPa.
+    diameter
+        Of its round section, mm.
+    tension_only
+        Whether it goes slack instead of carrying compression, as a thread does.
+    bar_length
+        Longest bar, mm; ``None`` for half the mean edge of the cells that the fibre passes.
+    """
+
+    curve: str
+    youngs_modulus: float
+    diameter: float
+    tension_only: bool = True
+    bar_length: float | None = None
+
+    @property
+    def axial_stiffness(self) -> float:
+        """E A in N."""
+        return 0.25 * np.pi * self.youngs_modulus * self.diameter**2
+
+
+class EmbeddedFibre:
+    """½ E A Σ ε² L over straight bars, ε = l/L − 1, whose ends move with the cells that they lie in.
+
+    The ends' displacement is interpolated by the shape functions of their host cells (Phillips and Zienkiewicz 1976;
+    Elwi and Hrudey 1989), so that the mesh need not know of the fibre. What lags is the axial force of every
+    bar (:class:`turgor.fem.term.Term`): the length constraint of a fibre that is a million times stiffer than the
+    body is then linear to the iteration, which converges in long steps.
+
+    Parameters
+    ----------
+    mesh
+        The body; it holds the curve.
+    fibre
+        What runs along it.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no such curve, the curve leaves the body, or a property is not positive.
+    """
+
+    def __init__(self, mesh: Mesh, fibre: Fibre) -> None:
+        self.fibre = fibre
+        self.ends = _bar_ends(mesh, fibre)
+        cell, local = locate(mesh.points, mesh.cells, self.ends, f"curves.{fibre.curve}")
+        self.nodes, self._share = _end_differences(mesh.cells[cell], TET10.shape(local), mesh.n_points)
+        self._span = self._difference(mesh.points)
+        self.length = np.linalg.norm(self._span, axis=1)
+
+    def strain(self, u: Floats) -> Floats:
+        """Return the engineering strain l/L − 1 of every bar at displacement `u`, ``(n_bars,)``."""
+        _, length = self._direction(u)
+        return np.asarray(length / self.length - 1.0)
+
+    def tension(self, u: Floats) -> Floats:
+        """Return the axial force of every bar at displacement `u`, ``(n_bars,)``, N."""
+        force = self.fibre.axial_stiffness * self.strain(u)
+        return np.maximum(force, 0.0) if self.fibre.tension_only else force
+
+    def energy(self, state: State) -> float:
+        """Return the strain energy, N mm."""
+        return 0.5 * float(np.sum(self.tension(state.u) ** 2 * self.length)) / self.fibre.axial_stiffness
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the bars' forces, N."""
+        direction, _ = self._direction(state.u)
+        pull = self.tension(state.u)[:, None] * direction
+        add_at_nodes(self.nodes, self._share[:, :, None] * pull[:, None, :], out)
+
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
+        """Fill E A/L n ⊗ n of the taut bars and the geometric part of the lagged axial forces, N/mm."""
+        direction, length = self._direction(state.u)
+        _fill_stiffness(self._share, direction, self._axial(state.u), lagged / length, out)
+
+    def lagged_at(self, u: Floats) -> Floats:
+        """Return the axial forces at displacement `u`, ``(n_bars,)``, N."""
+        return self.tension(u)
+
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return the axial forces that the step `du` predicts, linearised at the state, ``(n_bars,)``, N."""
+        direction, _ = self._direction(state.u)
+        change = np.einsum("bi,bi->b", direction, self._difference(du))
+        force = self.tension(state.u) + self._axial(state.u) * change
+        return np.asarray(np.maximum(force, 0.0) if self.fibre.tension_only else force)
+
+    def _difference(self, field: Floats) -> Floats:
+        """Return the difference of a nodal field between the two ends of every bar, ``(n_bars, 3)``."""
+        return np.asarray(np.einsum("ba,bai->bi", self._share, field[self.nodes]))
+
+    def _direction(self, u: Floats) -> tuple[Floats, Floats]:
+        span = self._span + self._difference(u)
+        length = np.linalg.norm(span, axis=1)
+        return span / length[:, None], length
+
+    def _axial(self, u: Floats) -> Floats:
+        """Return the slope of axial force by length, ``(n_bars,)``, N/mm: none where a bar is slack."""
+        slope = self.fibre.axial_stiffness / self.length
+        # A bar at rest counts as taut.
+        return np.where(self.strain(u) < 0.0, 0.0, slope) if self.fibre.tension_only else slope
+
+
+def _bar_ends(mesh: Mesh, fibre: Fibre) -> Floats:
+    """Return the ends of the bars ``(n_bars + 1, 3)``: along the curve at equal distances, corners kept."""
+    for key in ("youngs_modulus", "diameter", "bar_length"):
+        value = getattr(fibre, key)
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise InputError("this must be positive", key=f"fibres.{fibre.curve}.{key}", value=value)
+    curve = mesh.curve(fibre.curve)
+    step = np.diff(curve, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    if len(curve) < 2 or not length.all():
+        raise InputError("the curve has fewer than two points, or two in the same place", key=f"curves.{fibre.curve}")
+    bar = fibre.bar_length or _mean_edge(mesh, curve, fibre.curve) / BARS_PER_EDGE
+    turning = np.einsum("ki,ki->k", step[:-1], step[1:]) / (length[:-1] * length[1:])
+    corners = [0, *(np.flatnonzero(turning < CORNER) + 1), len(curve) - 1]
+    at = np.concatenate([[0.0], np.cumsum(length)])
+    stations = [np.zeros(1)]
+    for first, last in itertools.pairwise(corners):
+        count = max(1, int(np.ceil((at[last] - at[first]) / bar - 1e-9)))
+        stations.append(np.linspace(at[first], at[last], count + 1)[1:])
+    wanted = np.concatenate(stations)
+    return np.column_stack([np.interp(wanted, at, curve[:, i]) for i in range(3)])
+
+
+def _mean_edge(mesh: Mesh, curve: Floats, name: str) -> float:
+    cell, _ = locate(mesh.points, mesh.cells, curve, f"curves.{name}")
+    corners = mesh.points[mesh.cells[np.unique(cell), :4]]
+    edges = [corners[:, a] - corners[:, b] for a, b in TET10.edges]
+    return float(np.linalg.norm(edges, axis=2).mean())
+
+
+def _end_differences(hosts: Ints, shape: Floats, n_points: int) -> tuple[Ints, Floats]:
+    """Return, for each bar, the nodes that move its ends and each one's share in (second end − first end).
+
+    `hosts` ``(n_ends, 10)`` and `shape` ``(n_ends, 10)`` describe the ends. The results are ``(n_bars, width)``;
+    bars with fewer nodes repeat one of them with share zero.
+    """
+    ends = sp.csr_matrix(
+        (shape.ravel(), hosts.ravel(), np.arange(0, hosts.size + 1, hosts.shape[1])), shape=(len(hosts), n_points)
+    )
+    share = (ends[1:] - ends[:-1]).tocsr()
+    # A node of the face, edge or corner opposite to which an end lies has no share in it but rounding.
+    share.data[np.abs(share.data) < 1e-10] = 0.0
+    share.eliminate_zeros()
+    share.sort_indices()
+    count = np.diff(share.indptr)
+    row = np.repeat(np.arange(len(count)), count)
+    slot = np.arange(share.nnz) - share.indptr[row]
+    nodes = np.repeat(share.indices[share.indptr[:-1], None], count.max(), axis=1).astype(np.int32)
+    values = np.zeros(nodes.shape)
+    nodes[row, slot] = share.indices
+    values[row, slot] = share.data
+    return nodes, values
+
+
+@parallel
+def _fill_stiffness(share, direction, axial, lateral, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (n_bars, packed)``, blocks ``c_a c_b (axial n ⊗ n + lateral (1 − n ⊗ n))``, c the shares."""
+    width = share.shape[1]
+    for bar in nb.prange(len(share)):
+        n = direction[bar]
+        at = 0
+        for a in range(width):
+            for i in range(3):
+                for b in range(a, width):
+                    weight = share[bar, a] * share[bar, b]
+                    for k in range(i if a == b else 0, 3):
+                        value = (axial[bar] - lateral[bar]) * n[i] * n[k]
+                        if i == k:
+                            value += lateral[bar]
+                        out[bar, at] = weight * value
+                        at += 1
