@@ -1,89 +1,95 @@
-"""Faces of a tetrahedral mesh: which cell a triangle belongs to, and which way it looks."""
+"""Faces of a mesh (in two dimensions its edges): which cell one belongs to, and which way it looks."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from turgor.common.errors import InputError
-from turgor.mesh.tet10 import FACES, IntArray
+from turgor.mesh.cells import Ints, body_cell, face_cell
 
 
-def all_faces(cells: IntArray) -> IntArray:
-    """Return the four outward six-node faces of every cell, shape ``(4 m, 6)``, cell by cell."""
-    faces: IntArray = cells[:, FACES].reshape(-1, 6)
-    return faces
+def all_faces(cells: Ints) -> Ints:
+    """Return the outward faces of every cell ``(m, n_nodes)``, cell by cell: ``(m · n_faces, nodes_per_face)``."""
+    faces = body_cell(cells).faces
+    return np.asarray(cells[:, faces].reshape(-1, faces.shape[1]))
 
 
-def boundary_faces(cells: IntArray) -> IntArray:
-    """Return the outward six-node faces that belong to one cell only, shape ``(k, 6)``."""
+def boundary_faces(cells: Ints) -> Ints:
+    """Return the outward faces that belong to one cell only, shape ``(k, nodes_per_face)``."""
     faces = all_faces(cells)
     _, first, counts = np.unique(_keys(faces), axis=0, return_index=True, return_counts=True)
-    boundary: IntArray = faces[np.sort(first[counts == 1])]
+    boundary: Ints = faces[np.sort(first[counts == 1])]
     return boundary
 
 
-def host_cells(cells: IntArray, triangles: IntArray) -> IntArray:
-    """Return the cell whose outward face each six-node triangle is, shape ``(k,)``; −1 where there is none.
+def host_cells(cells: Ints, faces: Ints) -> Ints:
+    """Return the cell whose outward face each of the `faces` is, shape ``(k,)``; −1 where there is none.
 
-    The triangle must turn the way the cell's face does; which corner comes first does not matter.
+    The face must turn the way the cell's face does; which corner comes first does not matter.
     """
-    if triangles.size == 0:
+    if faces.size == 0:
         return np.zeros(0, dtype=np.int32)
-    faces, wanted = _rotated(all_faces(cells)), _rotated(triangles)
-    _, inverse = np.unique(np.vstack([faces, wanted]), axis=0, return_inverse=True)
+    own, wanted = _rotated(all_faces(cells)), _rotated(faces)
+    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
     owner = np.full(inverse.max() + 1, -1, dtype=np.int32)
-    owner[inverse[: len(faces)]] = np.arange(len(faces)) // 4
-    return owner[inverse[len(faces) :]]
+    owner[inverse[: len(own)]] = np.arange(len(own)) // len(body_cell(cells).faces)
+    return owner[inverse[len(own) :]]
 
 
-def outward_faces(cells: IntArray, corners: IntArray) -> IntArray:
+def outward_faces(cells: Ints, corners: Ints) -> Ints:
     """Return the boundary faces, oriented outward, that have the given corner nodes.
 
     Parameters
     ----------
     cells
-        Shape ``(m, 10)``.
+        Shape ``(m, n_nodes)``.
     corners
-        Shape ``(k, 3)``, in any order and orientation.
+        Shape ``(k, corners_per_face)``, in any order and orientation.
 
     Returns
     -------
     ndarray
-        Shape ``(k, 6)``.
+        Shape ``(k, nodes_per_face)``.
 
     Raises
     ------
     InputError
-        If a triangle is not on the boundary of the mesh.
+        If a face is not on the boundary of the mesh.
     """
     boundary = boundary_faces(cells)
-    wanted = np.sort(corners.reshape(-1, 3), axis=1)
-    _, inverse = np.unique(np.vstack([_keys(boundary), wanted]), axis=0, return_inverse=True)
+    own = _keys(boundary)
+    wanted = np.sort(corners.reshape(-1, own.shape[1]), axis=1)
+    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
     face_of = np.full(inverse.max(initial=-1) + 1, -1, dtype=np.int64)
     face_of[inverse[: len(boundary)]] = np.arange(len(boundary))
     found = face_of[inverse[len(boundary) :]]
     if (found < 0).any():
         nodes = wanted[np.argmax(found < 0)].tolist()
-        raise InputError(f"the triangle of nodes {nodes} is not a face on the boundary of the mesh")
+        what = {2: "edge", 3: "triangle", 4: "quadrilateral"}[len(nodes)]
+        raise InputError(f"the {what} of nodes {nodes} is not a face on the boundary of the mesh")
     return boundary[found]
 
 
-def rim_edges(triangles: IntArray) -> IntArray:
-    """Return the three-node edges (two ends, middle) that only one of the triangles has, shape ``(e, 3)``."""
-    edges = triangles[:, [[0, 1, 3], [1, 2, 4], [2, 0, 5]]].reshape(-1, 3)
+def rim_edges(faces: Ints) -> Ints:
+    """Return the sides that only one of the faces has: three-node edges ``(e, 3)``, or the ends of edges ``(e, 1)``."""
+    sides = face_cell(faces).faces
+    edges = faces[:, sides].reshape(-1, sides.shape[1])
     _, first, counts = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
-    rim: IntArray = edges[first[counts == 1]]
+    rim: Ints = edges[first[counts == 1]]
     return rim
 
 
-def _keys(faces: IntArray) -> IntArray:
-    keys: IntArray = np.sort(faces[:, :3], axis=1)
+def _keys(faces: Ints) -> Ints:
+    keys: Ints = np.sort(faces[:, : face_cell(faces).n_corners], axis=1)
     return keys
 
 
-def _rotated(faces: IntArray) -> IntArray:
-    """Turn each triangle so that its lowest corner comes first, keeping the sense of rotation."""
-    start = np.argmin(faces[:, :3], axis=1)
-    turn = (start[:, None] + np.arange(3)) % 3
-    rotated: IntArray = np.take_along_axis(faces, np.hstack([turn, turn + 3]), axis=1)
-    return rotated
+def _rotated(faces: Ints) -> Ints:
+    """Turn each face so that its lowest corner comes first, keeping the sense of rotation."""
+    n = face_cell(faces).n_corners
+    if n == 2:
+        return faces
+    start = np.argmin(faces[:, :n], axis=1)
+    turn = (start[:, None] + np.arange(n)) % n
+    rotated: Ints = np.take_along_axis(faces, np.hstack([turn, turn + n]), axis=1)
+    return np.hstack([rotated, faces[:, 2 * n :]])

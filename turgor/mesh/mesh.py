@@ -1,4 +1,4 @@
-"""The mesh: second-order tetrahedra with named regions, surfaces, markers and curves."""
+"""The mesh: second-order cells with named regions, surfaces, markers and curves."""
 
 from __future__ import annotations
 
@@ -11,39 +11,46 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.common.errors import InputError
-from turgor.mesh.faces import host_cells, rim_edges
-from turgor.mesh.tet10 import (
-    QUADRATURE_POINTS,
-    FloatArray,
-    IntArray,
-    cell_volumes,
+from turgor.mesh.cells import (
+    CELLS,
+    Cell,
+    body_cell,
+    determinants,
     face_areas,
     face_fluxes,
-    jacobian_determinants,
+    is_body_cell,
+    jacobians,
 )
+from turgor.mesh.faces import host_cells, rim_edges
+from turgor.mesh.tet10 import FloatArray, IntArray, cell_volumes
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A solid cut into curved ten-node tetrahedra, in mm; it does not change after construction.
+    """A body cut into curved cells of one kind, in mm; it does not change after construction.
+
+    The kind follows from the number of nodes of a cell: ``tet10`` or ``hex27`` in space, ``tri6`` or ``quad9`` in the
+    plane, where areas take the place of volumes and three-node edges that of faces.
 
     Parameters
     ----------
     points
-        Shape ``(n, 3)``, float64.
+        Shape ``(n, d)``, float64; d = 3 or 2.
     cells
-        Shape ``(m, 10)``, int32: node indices in VTK order (corners, then the middles of 01 12 02 03 13 23).
+        Shape ``(m, 10)``, ``(m, 27)``, ``(m, 6)`` or ``(m, 9)``, int32: node indices in VTK order (corners, then the
+        middles of the edges, for a tetrahedron 01 12 02 03 13 23, then those of the faces, then the centre).
     regions
         Name → cell indices. Every cell is in exactly one region; left out, all cells are in ``body``.
     surfaces
-        Name → ``(k, 6)`` node indices of six-node triangles (corners, then the middles of 01 12 20), each the face of
-        a cell and oriented outward from it, so that on a cavity the normal points into the air.
+        Name → faces, of a ``tet10`` ``(k, 6)`` node indices of six-node triangles (corners, then the middles of 01 12
+        20), of a ``hex27`` ``(k, 9)``, of plane cells ``(k, 3)`` (two ends, middle). Each is the face of a cell and
+        oriented outward from it (an edge has its cell on the left), so that on a cavity the normal points into the air.
     markers
         Name → node indices: a point, or points in order along a line.
     curves
-        Name → ``(j, 3)`` points of a polyline that runs through the cells without belonging to them.
+        Name → ``(j, d)`` points of a polyline that runs through the cells without belonging to them.
 
     Raises
     ------
@@ -59,19 +66,35 @@ class Mesh:
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._set("points", _frozen(self.points, np.float64, (None, 3), "points"))
-        self._set("cells", _frozen(self.cells, np.int32, (None, 10), "cells"))
+        self._set("cells", _frozen_cells(self.cells, np.shape(self.points)[-1:]))
+        d, face_nodes = self.dimension, self.cell.faces.shape[1]
+        self._set("points", _frozen(self.points, np.float64, (None, d), "points"))
         regions = self.regions or {"body": np.arange(len(self.cells), dtype=np.int32)}
         self._set("regions", _frozen_map(regions, np.int32, (None,), "regions"))
-        self._set("surfaces", _frozen_map(self.surfaces, np.int32, (None, 6), "surfaces"))
+        self._set("surfaces", _frozen_map(self.surfaces, np.int32, (None, face_nodes), "surfaces"))
         self._set("markers", _frozen_map(self.markers, np.int32, (None,), "markers"))
-        self._set("curves", _frozen_map(self.curves, np.float64, (None, 3), "curves"))
+        self._set("curves", _frozen_map(self.curves, np.float64, (None, d), "curves"))
         self._check_points_and_cells()
         self._check_regions()
         for name, nodes in self.markers.items():
             _check_indices(nodes, self.n_points, f"markers.{name}", "nodes")
-        for name, triangles in self.surfaces.items():
-            self._check_surface(name, triangles)
+        for name, faces in self.surfaces.items():
+            self._check_surface(name, faces)
+
+    @property
+    def cell(self) -> Cell:
+        """The reference cell of the mesh's kind."""
+        return body_cell(self.cells)
+
+    @property
+    def cell_type(self) -> str:
+        """Name of the kind of the cells: ``tet10``, ``hex27``, ``tri6`` or ``quad9``."""
+        return self.cell.name
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of a point, 3 or 2."""
+        return self.cell.dimension
 
     @property
     def n_points(self) -> int:
@@ -80,7 +103,7 @@ class Mesh:
 
     @property
     def n_cells(self) -> int:
-        """Number of tetrahedra."""
+        """Number of cells."""
         return len(self.cells)
 
     def region(self, name: str) -> IntArray:
@@ -88,7 +111,7 @@ class Mesh:
         return _named(self.regions, name, "region")
 
     def surface(self, name: str) -> IntArray:
-        """Return the ``(k, 6)`` triangles of a surface; raise InputError if there is none of that name."""
+        """Return the faces ``(k, nodes_per_face)`` of a surface; raise InputError if there is none of that name."""
         return _named(self.surfaces, name, "surface")
 
     def marker(self, name: str) -> IntArray:
@@ -96,7 +119,7 @@ class Mesh:
         return _named(self.markers, name, "marker")
 
     def curve(self, name: str) -> FloatArray:
-        """Return the ``(j, 3)`` points of a curve; raise InputError if there is none of that name."""
+        """Return the ``(j, d)`` points of a curve; raise InputError if there is none of that name."""
         return _named(self.curves, name, "curve")
 
     def surface_nodes(self, name: str) -> IntArray:
@@ -104,31 +127,35 @@ class Mesh:
         return np.unique(self.surface(name))
 
     def surface_hosts(self, name: str) -> IntArray:
-        """Return the cell that each triangle of a surface is a face of, shape ``(k,)``."""
+        """Return the cell that each face of a surface belongs to, shape ``(k,)``."""
         return host_cells(self.cells, self.surface(name))
 
     def surface_area(self, name: str) -> float:
-        """Return the area of a surface in mm²; raise InputError for an unknown name."""
+        """Return the area of a surface in mm² (in the plane: its length in mm); raise InputError if unknown."""
         return float(face_areas(self.points[self.surface(name)]).sum())
 
     def volume(self, region: str | None = None) -> float:
-        """Return the volume in mm³ of one region, or of the whole mesh (exact for the curved elements)."""
+        """Return the volume in mm³ (area in mm²) of one region, or of the whole mesh: exact for curved cells."""
         cells = self.cells if region is None else self.cells[self.region(region)]
-        return float(cell_volumes(self.points[cells]).sum())
+        nodes = self.points[cells]
+        if self.cell_type == "tet10":
+            return float(cell_volumes(nodes).sum())
+        return float((determinants(jacobians(nodes, self.cell)) @ self.cell.weights).sum())
 
     def enclosed_volume(self, surface: str) -> float:
-        """Return the volume in mm³ of the air that a surface encloses, ``−⅓ ∫ x·n dA`` over its curved triangles.
+        """Return the volume in mm³ of the air that a surface encloses, ``−⅓ ∫ x·n dA`` over its curved faces.
 
-        The normal n points out of the solid, so a cavity's volume is positive. The surface must be closed, or closed by
-        the coordinate planes through the origin (a half, a quarter or an octant model), on which x·n vanishes.
+        In the plane it is the area in mm², ``−½ ∫ x·n ds``. The normal n points out of the solid, so a cavity's volume
+        is positive. The surface must be closed, or closed by the coordinate planes through the origin (a half, a
+        quarter or an octant model), on which x·n vanishes.
 
         Raises
         ------
         InputError
             For an unknown name, or a surface with a rim outside these planes: it encloses no volume.
         """
-        triangles = self.surface(surface)
-        rim = self.points[rim_edges(triangles)]
+        faces = self.surface(surface)
+        rim = self.points[rim_edges(faces)]
         reach = np.abs(self.points).max()
         if not (np.abs(rim) <= 1e-9 * reach).all(axis=1).any(axis=1).all():
             raise InputError(
@@ -136,8 +163,8 @@ class Mesh:
                 key=surface,
                 expected="a closed surface, or one whose rim lies in coordinate planes through the origin",
             )
-        flux, _ = face_fluxes(self.points[triangles])
-        return -float(flux.sum()) / 3.0
+        flux, _ = face_fluxes(self.points[faces])
+        return -float(flux.sum()) / self.dimension
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -152,10 +179,10 @@ class Mesh:
         used = np.bincount(self.cells.ravel(), minlength=self.n_points)
         if (used == 0).any():
             raise InputError("a node belongs to no cell", key="points", value=int(np.argmax(used == 0)))
-        determinants = jacobian_determinants(self.points[self.cells], QUADRATURE_POINTS).min(axis=1)
-        if (determinants <= 0.0).any():
-            cell = int(np.argmin(determinants))
-            place = self.points[self.cells[cell, :4]].mean(axis=0).round(3).tolist()
+        smallest = determinants(jacobians(self.points[self.cells], self.cell)).min(axis=1)
+        if (smallest <= 0.0).any():
+            cell = int(np.argmin(smallest))
+            place = self.points[self.cells[cell, : self.cell.n_corners]].mean(axis=0).round(3).tolist()
             raise InputError(f"a cell is turned inside out near {place} mm", key="cells", value=cell)
 
     def _check_regions(self) -> None:
@@ -168,13 +195,29 @@ class Mesh:
             problem = "a cell is in no region" if count[cell] == 0 else "a cell is in two regions"
             raise InputError(problem, key="regions", value=cell)
 
-    def _check_surface(self, name: str, triangles: IntArray) -> None:
-        _check_indices(triangles, self.n_points, f"surfaces.{name}", "nodes")
-        hosts = host_cells(self.cells, triangles)
+    def _check_surface(self, name: str, faces: IntArray) -> None:
+        _check_indices(faces, self.n_points, f"surfaces.{name}", "nodes")
+        hosts = host_cells(self.cells, faces)
         if (hosts < 0).any():
-            face = triangles[np.argmin(hosts)].tolist()
-            problem = "a triangle is not the outward face of a cell"
-            raise InputError(problem, key=f"surfaces.{name}", value=face, expected="six nodes, turning outward")
+            face = faces[np.argmin(hosts)].tolist()
+            problem = "a face is not the outward face of a cell"
+            expected = f"{len(face)} nodes, turning outward"
+            raise InputError(problem, key=f"surfaces.{name}", value=face, expected=expected)
+
+
+def _frozen_cells(cells: Any, dimension: tuple[int, ...]) -> IntArray:
+    """Return a read-only copy of the cells, of a kind that there is."""
+    width = np.shape(cells)[-1] if np.ndim(cells) == 2 else 0
+    if not is_body_cell(width):
+        kinds = [cell for cell in CELLS.values() if cell.dimension > 1]
+        kinds = [cell for cell in kinds if (cell.dimension,) == dimension] or kinds
+        raise InputError(
+            f"the array has shape {np.shape(cells)}",
+            key="cells",
+            expected=" or ".join(f"shape (n, {cell.n_nodes})" for cell in kinds) + " of integers",
+        )
+    frozen: IntArray = _frozen(cells, np.int32, (None, width), "cells")
+    return frozen
 
 
 def _frozen(values: Any, kind: npt.DTypeLike, shape: tuple[int | None, ...], key: str) -> Any:

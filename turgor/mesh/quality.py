@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turgor.mesh.cells import CELLS, jacobians
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.tet10 import FloatArray, jacobian_coefficients, shape_gradients
+from turgor.mesh.tet10 import FloatArray, jacobian_coefficients
 
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
 # The three other corners as seen from each corner, so ordered that a valid element gives a positive product.
@@ -71,9 +72,9 @@ def quality(mesh: Mesh) -> Quality:
 
 
 def _scaled_jacobian(nodes: FloatArray) -> FloatArray:
-    jacobians = np.einsum("mai,qaj->mqij", nodes, shape_gradients(_CORNERS), optimize=True)
+    at_corners = jacobians(nodes, CELLS["tet10"], _CORNERS)
     directions = _CORNERS[_NEIGHBOURS] - _CORNERS[:, None, :]
-    tangents = np.einsum("mqij,qej->mqei", jacobians, directions)
+    tangents = np.einsum("mqij,qej->mqei", at_corners, directions)
     tangents /= np.linalg.norm(tangents, axis=-1, keepdims=True)
     worst: FloatArray = np.sqrt(2.0) * np.linalg.det(tangents).min(axis=1)
     return worst

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from turgor.common.errors import InputError
 from turgor.common.units import from_internal
+from turgor.mesh.cells import face_fluxes
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.tet10 import face_fluxes
 from turgor.results.sections import CENTRELINE, MOUNT, TIP_FACE, motion, seen_from_mount
 
 FloatArray = npt.NDArray[np.float64]
@@ -165,13 +165,13 @@ def centreline(mesh: Mesh, displacement: FloatArray) -> FloatArray:
 
 
 def cavity_volume(mesh: Mesh, displacement: FloatArray, cavity: str) -> float:
-    """Return the volume in mm³ that the surface `cavity` encloses in the displaced state, ``−⅓ ∫ x·n dA``.
+    """Return the volume in mm³ (in the plane: area in mm²) that the surface `cavity` encloses, ``−⅓ ∫ x·n dA``.
 
     The surface must be closed, or closed by coordinate planes (see :meth:`Mesh.enclosed_volume`).
     """
     triangles = mesh.surface(cavity)
     flux, _ = face_fluxes(mesh.points[triangles] + displacement[triangles])
-    return -float(flux.sum()) / 3.0
+    return -float(flux.sum()) / mesh.dimension
 
 
 def max_displacement(displacement: FloatArray) -> float:
