@@ -73,14 +73,15 @@ def generate(
     MissingPackageError
         If gmsh or a system library that it loads is absent.
     """
-    chosen = actuator.default_size if size is None else size
+    default = actuator.default_size
+    chosen = default if size is None else size
     for key, value in {"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}}.items():
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("the element size must be positive", key=key, value=value)
     with cad.session(actuator.template) as gmsh:
         progress("drawing")
         shape = actuator.draw()
-        scale = min(1.0, chosen / actuator.default_size)
+        scale = min(1.0, chosen / default)
         local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
         _set_local_sizes(gmsh, shape, local)
         _check_count(gmsh, chosen)

@@ -1,0 +1,1 @@
+"""Solids that another program drew: STEP files, with faces selected by rules."""
