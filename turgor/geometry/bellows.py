@@ -13,7 +13,7 @@ from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 from turgor.geometry.path import Piece, Step, offset_path
 
-_ANNEX = "thesis on TPU bellows and membrane actuators, annex 1"
+_ANNEX = "San Martin Lopez, Flexible TPU pneumatic actuator simulation, annex 1"
 _ASSUMED = "assumed"
 
 # A flatter flank would meet the plates in arcs too short to mesh, a steeper one make a corrugated tube.

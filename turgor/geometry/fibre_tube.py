@@ -12,7 +12,7 @@ from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
 
-_THESIS = "thesis on tilted-helix actuators, section 2.2"
+_THESIS = "Geer, Coiling motion of plant-inspired soft actuators (2019), section 2.2"
 _ASSUMED = "assumed"
 
 _POINTS_PER_TURN = 72

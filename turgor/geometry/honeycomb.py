@@ -12,7 +12,7 @@ from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 from turgor.geometry.path import rounded_polygon
 
-_PAPER = "honeycomb network paper, section 3.1"
+_PAPER = "Design and Analysis of a Hyperelastic Pneumatic Honeycomb Network Made of Ecoflex 00-35, section 3.1"
 _ASSUMED = "assumed"
 
 Corners = list[tuple[float, float]]

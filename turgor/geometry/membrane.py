@@ -11,7 +11,7 @@ from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 
-_THESIS = "thesis on TPU bellows and membrane actuators, section 2.2"
+_THESIS = "San Martin Lopez, Flexible TPU pneumatic actuator simulation, section 2.2"
 _ASSUMED = "assumed"
 
 

@@ -12,7 +12,7 @@ from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 
-_PAPER = "multi-material tube paper, section III"
+_PAPER = "Quasi-static FEA model for a multi-material soft pneumatic actuator in SOFA, section III"
 _ASSUMED = "assumed, the paper's drawing gives no numbers"
 
 

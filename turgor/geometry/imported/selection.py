@@ -9,21 +9,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from turgor.common.errors import InputError
-from turgor.common.units import Length, PositiveLength
 from turgor.geometry import cad
-
-Place = tuple[Length, Length, Length]
-Direction = tuple[float, float, float]
-
-
-class Cylinder(BaseModel):
-    """All space nearer than `radius` to the axis through `point` along `direction`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    point: Place
-    direction: Direction
-    radius: PositiveLength
+from turgor.geometry.space import Cylinder, Direction, Place, unit
 
 
 class Selection(BaseModel):
@@ -82,16 +69,13 @@ class Selection(BaseModel):
     def _in_cylinder(self, face: int) -> bool:
         if self.inside is None:
             return True
-        axis = _unit(self.inside.direction)
-        offsets = _samples(face) - np.array(self.inside.point)
-        away = np.linalg.norm(offsets - np.outer(offsets @ axis, axis), axis=1)
-        return bool((away <= self.inside.radius * (1 + 1e-6)).all())
+        return bool(self.inside.contains(_samples(face)).all())
 
     def _faces_along(self, face: int) -> bool:
         if self.normal is None:
             return True
         normals = outward_normals(face)
-        return bool((normals @ _unit(self.normal) > math.cos(math.radians(self.angle))).all())
+        return bool((normals @ unit(self.normal) > math.cos(math.radians(self.angle))).all())
 
 
 def outward_normals(face: int) -> Any:
@@ -122,11 +106,3 @@ def _parameters(face: int) -> list[float]:
     grid = [(u, v) for u in np.linspace(u0, u1, 7)[1:-1] for v in np.linspace(v0, v1, 7)[1:-1]]
     on_face = [pair for pair in grid if gmsh.model.isInside(2, face, pair, parametric=True)]
     return [float(number) for pair in on_face or grid for number in pair]
-
-
-def _unit(direction: Direction) -> Any:
-    vector = np.array(direction)
-    length = float(np.linalg.norm(vector))
-    if not length > 0.0:
-        raise InputError("a direction has no length", value=direction, expected="three numbers, not all zero")
-    return vector / length

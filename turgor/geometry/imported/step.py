@@ -13,7 +13,8 @@ from pydantic import Field
 from turgor.common.errors import InputError
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape
-from turgor.geometry.imported.selection import Place, Selection
+from turgor.geometry.imported.selection import Selection
+from turgor.geometry.space import Place
 
 
 class StepFile(Actuator):
