@@ -63,6 +63,13 @@ def displacements(folder: Path) -> np.ndarray:
     return np.array([record.displacement for record in RunStore.open(folder).records()])
 
 
+def same_motion(one: Path, other: Path) -> None:
+    """Two runs of the same case: the factorisation on several threads rounds differently each time."""
+    first, second = displacements(one), displacements(other)
+    assert first.shape == second.shape
+    np.testing.assert_allclose(first, second, atol=1e-7 * np.abs(first).max())
+
+
 def test_the_folder_holds_what_was_promised(whole: Run) -> None:
     names = {path.name for path in whole.folder.iterdir()}
     assert {"summary.json", "history.csv", "result.pvd", "report.html", "case.yaml", "run.log"} <= names
@@ -84,7 +91,7 @@ def test_the_folder_holds_what_was_promised(whole: Run) -> None:
 @pytest.mark.usefixtures("unreported")
 def test_the_resolved_case_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
     again = run(load_case(whole.folder / "case.yaml"), tmp_path / "again")
-    assert np.array_equal(displacements(again.folder), displacements(whole.folder))
+    same_motion(again.folder, whole.folder)
     assert (again.folder / "case.yaml").read_bytes() == (whole.folder / "case.yaml").read_bytes()
 
 
@@ -164,7 +171,7 @@ def test_the_test_data_go_with_the_run(small_tube: Path, tmp_path: Path) -> None
     assert document["fits"][0]["curve"]["stress_MPa"][-1] == pytest.approx(stress[-1], rel=1e-3)
     data.unlink()
     again = run(load_case(moved / "case.yaml"), tmp_path / "again")
-    assert np.array_equal(displacements(again.folder), displacements(moved))
+    same_motion(again.folder, moved)
     (moved / "data" / "soft rubber.csv").write_text("\n".join(["Strain;Stress (MPa)", *lines]), encoding="utf-8")
     with pytest.raises(InputError, match="another case"):
         run(load_case(again.folder / "case.yaml"), moved, resume=True)
