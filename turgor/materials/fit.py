@@ -11,7 +11,7 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.materials.compressible import fit_bulk_modulus, fit_compressible
-from turgor.materials.fit_result import CONSTRAINED, Fit, FitReport, recommend
+from turgor.materials.fit_result import CONSTRAINED, Fit, FitReport, biaxial_ratios, recommend
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.inequalities import Limits
 from turgor.materials.kinematics import Array
@@ -26,9 +26,11 @@ from turgor.materials.testdata import read_tests
 Data = str | Path | MaterialTest
 Model = str | type[Hyperelastic]
 
-PLAUSIBLE_RATIOS = (1.0, 1.5)
-"""Equibiaxial over uniaxial stress at a stretch of 1.5 that a constrained fit keeps where only uniaxial tension is
-known; well inside what is plausible at all."""
+PLAUSIBLE_RATIOS = {1.5: (1.0, 1.5), 2.0: (0.95, 1.8)}
+"""Equibiaxial over uniaxial stress, by stretch, that a constrained fit keeps where only uniaxial tension is known."""
+
+SEARCHED_WHEN_CONSTRAINED = 2
+"""Models with more constants to search for are constrained on request only: it takes them seconds."""
 
 RELATIVE_FLOOR = 0.02
 """With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
@@ -63,8 +65,8 @@ def fit(
     bounds
         Narrower bounds of constants by name, in MPa or as numbers, for every model that has them.
     stability
-        ``"prefer"``: plain fits, and beside those that speak against themselves, where the model is linear in its
-        constants, a constrained one; ``"require"``: every fit constrained to be stable; ``"ignore"``: plain fits only.
+        ``"prefer"``: plain fits, and beside those that something speaks against, where that is quick, a constrained
+        one; ``"require"``: every fit constrained to be stable; ``"ignore"``: plain fits only.
     stable_to
         The largest principal stretch to which the material must be stable; by default that of the tests.
     specimen
@@ -197,14 +199,14 @@ def _fits_of(
         expected = "prefer, require or ignore"
         raise InputError("unknown choice", key="stability", value=stability, expected=expected)
     biaxial_measured = any(test.mode in ("equibiaxial", "planar") for test in problem.tests)
-    limits = Limits(stretch, biaxial=None if biaxial_measured else PLAUSIBLE_RATIOS)
+    limits = Limits(stretch, biaxial={} if biaxial_measured else PLAUSIBLE_RATIOS)
     found = []
     if stability != "require":
         plain = solve(kind, problem)
         if plain is not None:
             found.append(_judged(kind, problem, plain, stretch, volumetric, constrained=False))
-    linear = all(constant.linear for constant in kind.constants())
-    wanted = stability == "require" or (stability == "prefer" and linear and found and found[0].objections)
+    quick = sum(not constant.linear for constant in kind.constants()) <= SEARCHED_WHEN_CONSTRAINED
+    wanted = stability == "require" or (stability == "prefer" and quick and found and found[0].objections)
     if wanted:
         kept = solve(kind, problem, limits)
         judged = None if kept is None else _judged(kind, problem, kept, stretch, volumetric, constrained=True)
@@ -254,7 +256,7 @@ def _judged(
         confidence={} if constrained else {name: (v - half, v + half) for (name, v), half in intervals},
         correlation=numbers.correlation,
         digit_sensitivity=digit_sensitivity(material, largest_stretch(problem.tests)) if material else np.inf,
-        biaxial_ratio=float(material.equibiaxial(1.5) / material.uniaxial(1.5)) if material else np.nan,
+        biaxial_ratios=biaxial_ratios(material) if material else {},
         biaxial_measured=any(test.mode == "equibiaxial" for test in problem.tests),
         remark=remark,
     )

@@ -8,8 +8,8 @@ adding the eigenvectors of the matrices that are not yet positive definite.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import nnls
@@ -36,15 +36,15 @@ class Limits:
     margin
         The smallest eigenvalue of Drucker's matrix stays above this part of the initial shear modulus.
     biaxial
-        Bounds of the ratio of equibiaxial to uniaxial nominal stress at a stretch of 1.5, or ``None``.
+        Bounds of the ratio of equibiaxial to uniaxial nominal stress by stretch; empty where it is measured.
     cancellation
         No modulus adds more than so many times the measured stress: four digits then fix the response.
     """
 
     largest_stretch: float
     margin: float = 0.02
-    biaxial: tuple[float, float] | None = None
-    cancellation: float = 20.0
+    biaxial: Mapping[float, tuple[float, float]] = field(default_factory=dict)
+    cancellation: float = 8.0
 
     def enforce(
         self, A: Array, y: Array, free: Array, units: Sequence[Hyperelastic], norms: Array, rows: Array, floors: Array
@@ -103,13 +103,12 @@ class Limits:
         return matrices[np.all(np.isfinite(matrices), axis=(1, 2, 3))]
 
     def _biaxial_rows(self, units: Sequence[Hyperelastic], norms: Array) -> Array:
-        if self.biaxial is None:
-            return np.zeros((0, len(units)))
-        low, high = self.biaxial
-        uniaxial = np.array([float(unit.uniaxial(1.5)) for unit in units]) / norms
-        equibiaxial = np.array([float(unit.equibiaxial(1.5)) for unit in units]) / norms
-        both = np.stack([equibiaxial - low * uniaxial, high * uniaxial - equibiaxial])
-        return both[:, :] if np.all(np.isfinite(both)) else np.zeros((0, len(units)))
+        rows = []
+        for stretch, (low, high) in self.biaxial.items():
+            uniaxial = np.array([float(unit.uniaxial(stretch)) for unit in units]) / norms
+            equibiaxial = np.array([float(unit.equibiaxial(stretch)) for unit in units]) / norms
+            rows += [equibiaxial - low * uniaxial, high * uniaxial - equibiaxial]
+        return np.array([row for row in rows if np.all(np.isfinite(row))]).reshape(-1, len(units))
 
 
 def _initial_shear_moduli(units: Sequence[Hyperelastic], norms: Array) -> Array:
