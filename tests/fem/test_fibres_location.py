@@ -6,18 +6,31 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
-from turgor.fem.elements import TET10
 from turgor.fem.locate import locate
-from turgor.mesh.structured import box, shell_octant
+from turgor.mesh.structured import box, shell_octant, tube_sector
 
 
 def mapped(mesh, cell, local):
-    return np.einsum("pa,pai->pi", TET10.shape(local), mesh.points[mesh.cells[cell]])
+    return np.einsum("pa,pai->pi", mesh.cell.shape(local), mesh.points[mesh.cells[cell]])
 
 
 @pytest.fixture(scope="module")
 def octant():
     return shell_octant(1.0, 1.5, 2)
+
+
+@pytest.fixture(scope="module")
+def bricks():
+    return tube_sector(1.0, 1.5, 1.0, 2, cell_type="hex27")
+
+
+def test_random_points_of_hexahedra_are_found_again(bricks):
+    rng = np.random.default_rng(0)
+    cell = rng.integers(bricks.n_cells, size=300)
+    local = rng.uniform(0.01, 0.99, (300, 3))
+    found, coordinates = locate(bricks.points, bricks.cells, mapped(bricks, cell, local), "curve")
+    assert np.array_equal(found, cell)
+    np.testing.assert_allclose(coordinates, local, atol=1e-8)
 
 
 def test_random_points_of_curved_cells_are_found_again(octant):

@@ -1,4 +1,4 @@
-"""Where a point lies in a mesh of curved tetrahedra: its host cell and its reference coordinates there."""
+"""Where a point lies in a mesh of curved cells: its host cell and its reference coordinates there."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from turgor.common.errors import InputError
-from turgor.fem.elements import TET10
+from turgor.mesh.cells import Cell, body_cell
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 OUTSIDE = 0.05
-"""A point whose smallest barycentric coordinate is no less than minus this counts as inside: chords of a curve on a
-curved wall leave it by a little, and so does the wall itself from its quadratic faces."""
+"""A point outside its cell by no more than this in reference coordinates counts as inside: a curve given by points on a
+curved wall runs straight between them, and the wall itself is made of quadratic faces."""
+
+BULGE = 0.25
+"""A curved cell reaches beyond the bounding box of its nodes by less than this part of it."""
 
 ITERATIONS = 25
 
@@ -22,14 +25,13 @@ ITERATIONS = 25
 def locate(points: Floats, cells: Ints, places: Floats, name: str) -> tuple[Ints, Floats]:
     """Find the cell that each place lies in.
 
-    The candidates are the cells whose bounding box (of the Bézier control points, hence of the curved cell as a
-    whole) holds the place; in each, Newton's method inverts the quadratic map. Of several hosts the one in which
-    the place lies deepest is taken.
+    The candidates are the cells whose widened bounding box holds the place; in each, Newton's method inverts the
+    quadratic map. Of several hosts the one in which the place lies deepest is taken.
 
     Parameters
     ----------
     points, cells
-        The mesh: positions ``(n_points, 3)`` and ten-node tetrahedra ``(m, 10)``.
+        The mesh: positions ``(n_points, 3)`` and solid cells ``(m, n_nodes)``.
     places
         Where to look, ``(k, 3)``, mm.
     name
@@ -46,8 +48,10 @@ def locate(points: Floats, cells: Ints, places: Floats, name: str) -> tuple[Ints
         If a place lies outside every cell.
     """
     place, cell = _candidates(points[cells], places)
-    local, found = _inverted(points[cells[cell]], places[place])
-    depth = np.minimum(local.min(axis=1), 1.0 - local.sum(axis=1))
+    kind = body_cell(cells)
+    local, found = _inverted(kind, points[cells[cell]], places[place])
+    beyond = 1.0 - (local.sum(axis=1) if kind.simplex else local.max(axis=1))
+    depth = np.minimum(local.min(axis=1), beyond)
     depth[~found] = -np.inf
     # The deepest candidate of each place comes last in this order; ties go to the first cell.
     order = np.lexsort((-cell, depth, place))
@@ -66,11 +70,8 @@ def locate(points: Floats, cells: Ints, places: Floats, name: str) -> tuple[Ints
 
 def _candidates(nodes: Floats, places: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return pairs of place and cell whose boxes, a little widened, hold the place; pairs ascend by place."""
-    control = nodes.copy()
-    for middle, (a, b) in enumerate(TET10.edges, start=4):
-        control[:, middle] = 2.0 * nodes[:, middle] - 0.5 * (nodes[:, a] + nodes[:, b])
-    low, high = control.min(axis=1), control.max(axis=1)
-    centre, half = 0.5 * (low + high), (0.5 + OUTSIDE) * (high - low)
+    low, high = nodes.min(axis=1), nodes.max(axis=1)
+    centre, half = 0.5 * (low + high), (0.5 + BULGE) * (high - low)
     near = cKDTree(centre).query_ball_point(places, np.linalg.norm(half, axis=1).max(), return_sorted=True)
     count = np.array([len(cells) for cells in near], np.intp)
     place = np.repeat(np.arange(len(places)), count)
@@ -79,17 +80,17 @@ def _candidates(nodes: Floats, places: Floats) -> tuple[NDArray[np.intp], NDArra
     return place[holds], cell[holds]
 
 
-def _inverted(nodes: Floats, places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Invert the map of each element with `nodes` ``(p, 10, 3)`` at its place; say where that succeeded."""
-    local = np.full((len(places), 3), 0.25)
+def _inverted(cell: Cell, nodes: Floats, places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Invert the map of each cell with `nodes` ``(p, n_nodes, 3)`` at its place; say where that succeeded."""
+    local = np.tile(cell.nodes.mean(axis=0), (len(places), 1))
     size = np.ptp(nodes, axis=1).max(axis=1)
     found = np.zeros(len(places), bool)
     for _ in range(ITERATIONS):
-        gap = places - np.einsum("pa,pai->pi", TET10.shape(local), nodes)
+        gap = places - np.einsum("pa,pai->pi", cell.shape(local), nodes)
         found = np.linalg.norm(gap, axis=1) <= 1e-10 * size
         if found.all():
             break
-        jacobian = np.einsum("pai,paj->pij", nodes, TET10.gradient(local))
+        jacobian = np.einsum("pai,paj->pij", nodes, cell.gradient(local))
         # Far outside the element its map may fold; such a place is no candidate, so keep the iterate near.
         folded = np.abs(np.linalg.det(jacobian)) < 1e-9 * size**3
         jacobian[folded] = np.eye(3) * size[folded, None, None]

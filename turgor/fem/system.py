@@ -14,6 +14,7 @@ from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
+from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import SparsePattern, packed_size
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
@@ -55,7 +56,7 @@ class System:
         materials: Mapping[str, Hyperelastic],
         supports: Sequence[Support] = (),
         loads: Sequence[Load] = (),
-        reinforcements: Sequence[Fibre] = (),
+        reinforcements: Sequence[Fibre | Membrane] = (),
     ) -> None:
         prefer_light_threads()
         self.mesh = mesh
@@ -69,8 +70,9 @@ class System:
         check_held(mesh, self.constraints, springs)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
-        self.fibres = [EmbeddedFibre(mesh, fibre) for fibre in reinforcements]
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *self.fibres)
+        self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
+        self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *self.fibres, *self.membranes)
         self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead)
 
         free = ~self.constraints.fixed.ravel()
