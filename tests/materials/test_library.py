@@ -60,3 +60,21 @@ def test_the_formula_of_the_thesis_is_excluded_by_its_test():
 def test_unknown_name_suggests_near_ones():
     with pytest.raises(InputError, match="dragon-skin-30-yeoh"):
         get("dragon-skin-30")
+
+
+def test_the_tool_says_which_sign_the_test_excludes():
+    assert "compressive stress" in find("tpu-0deg-mooney-rivlin-5-formula").contradiction
+    for n in (2, 3, 5):
+        assert find(f"tpu-0deg-mooney-rivlin-{n}").contradiction == ""
+    assert "15.772 MPa was measured" in find("tpu-0deg-mooney-rivlin-9").contradiction
+    assert find("dragon-skin-30-yeoh").contradiction == ""
+
+
+def test_every_material_that_soft_robots_are_made_of_is_there():
+    listed = " ".join(entry.material for entry in library())
+    for name in (
+        "Ecoflex 00-10", "Ecoflex 00-20", "Ecoflex 00-30", "Ecoflex 00-35", "Ecoflex 00-50", "Dragon Skin 10",
+        "Dragon Skin 20", "Dragon Skin 30", "Elastosil M4601", "Smooth-Sil 950", "Mold Star", "PDMS", "TPU",
+        "NinjaFlex", "Agilus30", "TangoPlus", "natural rubber",
+    ):  # fmt: skip
+        assert name in listed, name

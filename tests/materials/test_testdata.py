@@ -212,6 +212,25 @@ def test_gauge_length_and_known_modulus_give_the_same_correction(tmp_path):
     assert by_modulus.as_dict()["corrections"]
 
 
+def test_toe_is_reported_and_removed(tmp_path):
+    x = np.linspace(1.0, 2.0, 101)
+    stress = 0.2 * (x - x**-2)
+    slack = 0.03
+    raw = read_one(write(tmp_path, table("strain,stress (MPa)", x * (1 + slack) - 1, stress)))
+    assert raw.toe == pytest.approx(slack, abs=0.005)
+    assert any("meets zero stress" in warning for warning in raw.warnings)
+    straight = raw.with_toe_removed()
+    np.testing.assert_allclose(straight.stretch, x[1:], rtol=6e-3)
+    assert abs(straight.toe) < 0.002
+    assert straight.corrections
+    clean = read_one(write(tmp_path, table("strain,stress (MPa)", x - 1, stress)))
+    assert not any("meets zero stress" in warning for warning in clean.warnings)
+
+
+def test_database_curve_has_a_toe(shared_data):
+    assert 0.01 < read_one(shared_data / "tensile" / "Dragon Skin 10 MEDIUM.csv").toe < 0.04
+
+
 GOOD = table("strain,stress (MPa)", STRETCH - 1, STRESS)
 
 MALFORMED = {

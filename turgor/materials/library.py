@@ -13,6 +13,7 @@ from difflib import get_close_matches
 from importlib import resources
 from typing import Any
 
+import numpy as np
 import yaml
 
 from turgor.common.errors import InputError
@@ -22,6 +23,9 @@ from turgor.materials.stability import Verdict, verdict
 
 _FILE = "library.yaml"
 
+TEST_TOLERANCE = 0.25
+"""A set whose stress at the end of its own test is farther off than this part of it is not a fit of that test."""
+
 
 @dataclass(frozen=True)
 class LibraryEntry:
@@ -29,7 +33,8 @@ class LibraryEntry:
 
     ``constants`` are text with units, as printed; ``convention`` says how Ogden's are to be read; ``tests`` and
     ``strain_range`` (engineering strain, ``None`` where not stated) say what they were fitted to; ``citable`` is false
-    where the origin of the numbers could not be traced to a publication; ``unusable`` says why a set must not be used.
+    where the origin of the numbers could not be traced to a publication; ``unusable`` says why a set must not be used;
+    ``measured`` is a point of the uniaxial test behind the set, ``strain`` and ``stress_MPa``, where it is printed.
     """
 
     name: str
@@ -45,6 +50,7 @@ class LibraryEntry:
     citable: bool = True
     unusable: str = ""
     remark: str = ""
+    measured: Mapping[str, float] = field(default_factory=dict)
 
     @functools.cached_property
     def build(self) -> Hyperelastic:
@@ -70,6 +76,25 @@ class LibraryEntry:
         """Nominal uniaxial stress at a stretch of 2 in MPa, the common yardstick."""
         return float(self.build.uniaxial(2.0))
 
+    @property
+    def contradiction(self) -> str:
+        """What the test behind the set excludes; empty if nothing or if no point of it is printed.
+
+        A tensile test has no compressive stress, and a fit meets the end of its own test within
+        :data:`TEST_TOLERANCE`.
+        """
+        if not self.measured:
+            return ""
+        strain, stress = self.measured["strain"], self.measured["stress_MPa"]
+        path = 1.0 + np.linspace(0.0, strain, 200)[1:]
+        answer = self.build.uniaxial(path)
+        if answer.min() < 0:
+            at = path[int(np.argmin(answer))] - 1.0
+            return f"compressive stress ({answer.min():.3g} MPa at a strain of {at:.3g}) in a tensile test"
+        if abs(answer[-1] - stress) > TEST_TOLERANCE * stress:
+            return f"{answer[-1]:.3g} MPa at a strain of {strain:g}, where {stress:g} MPa was measured"
+        return ""
+
     def as_dict(self) -> dict[str, object]:
         """Return the entry and what is computed from it in plain values."""
         material = self.build
@@ -90,6 +115,7 @@ class LibraryEntry:
             "source": self.source,
             "citable": self.citable,
             "unusable": self.unusable,
+            "contradiction": self.contradiction,
             "remark": self.remark,
         }
 

@@ -14,6 +14,12 @@ MODES = ("uniaxial", "equibiaxial", "planar", "simple-shear", "volumetric")
 STRAIN_SOURCES = ("extensometer", "video", "crosshead", "unknown")
 
 MINIMUM_POINTS = 5
+TOE_SPAN = 0.1
+"""The strain over which the first part of a curve is taken for a line."""
+
+TOE_LIMIT = 0.005
+"""A toe of less strain is not worth a word."""
+
 CROSSHEAD_WARNING = (
     "the strain comes from the crosshead: the specimen's shoulders and its slip in the grips count as strain of the "
     "gauge, so that stiffness comes out typically 20–50 % too low; give the effective gauge length or a known modulus "
@@ -106,6 +112,26 @@ class MaterialTest:
         note = f"strain × {strain / measured:.6g}: {stress:g} MPa is known at a strain of {strain:g}"
         return self._stretched(strain / measured, note)
 
+    @property
+    def toe(self) -> float:
+        """The strain at which the first part of the curve, drawn back as a line, meets zero stress.
+
+        Slack in the grips, a specimen not yet straight, or a preload that was set to zero show as a toe.
+        """
+        if self.mode not in ("uniaxial", "planar", "equibiaxial") or self.deformation.min() < 0:
+            return 0.0
+        first = self.deformation <= self.deformation.min() + TOE_SPAN
+        if np.count_nonzero(first) < MINIMUM_POINTS:
+            return 0.0
+        slope, intercept = np.polyfit(self.deformation[first], self.stress[first], 1)
+        return float(-intercept / slope) if slope > 0 else 0.0
+
+    def with_toe_removed(self) -> MaterialTest:
+        """Return the test with its strain counted from the end of the toe, the gauge being longer by as much."""
+        toe = self.toe
+        note = f"strain counted from {toe:.4g}, where the first part of the curve meets zero stress"
+        return replace(self, stretch=self.stretch / (1.0 + toe), corrections=(*self.corrections, note))
+
     def _stretched(self, factor: float, note: str) -> MaterialTest:
         if self.mode not in ("uniaxial", "planar", "equibiaxial"):
             raise InputError("the strain of this kind of test cannot be rescaled", file=self.file, value=self.mode)
@@ -129,6 +155,7 @@ class MaterialTest:
             "assumed": list(self.assumed),
             "warnings": list(self.warnings),
             "corrections": list(self.corrections),
+            "toe_strain": self.toe,
         }
 
 

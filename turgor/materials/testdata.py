@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from turgor.common.units import to_internal
 from turgor.materials.cleaning import Curve, clean
 from turgor.materials.columns import Column, find, header_unit, is_header, lacks, understand
 from turgor.materials.kinematics import Array
-from turgor.materials.measurement import CROSSHEAD_WARNING, MINIMUM_POINTS, MODES, MaterialTest, Specimen
+from turgor.materials.measurement import CROSSHEAD_WARNING, MINIMUM_POINTS, MODES, TOE_LIMIT, MaterialTest, Specimen
 from turgor.materials.tabular import Table, read_table
 
 LARGEST_BARE_STRAIN = 25.0
@@ -107,7 +108,7 @@ class _Reading:
             )
         shift = 0.0 if self.mode == "simple-shear" else 1.0
         source = self._strain_source()
-        return MaterialTest(
+        test = MaterialTest(
             mode=self.mode,
             stretch=curve.deformation + shift,
             stress=curve.stress,
@@ -121,6 +122,13 @@ class _Reading:
             assumed=tuple(self.assumed),
             warnings=(*self.warnings, *changed),
         )
+        if abs(test.toe) <= TOE_LIMIT:
+            return test
+        warning = (
+            f"the first part of the curve meets zero stress at a strain of {test.toe:.2%}, not at rest (slack, or a "
+            f"preload that was set to zero); the strain can be counted from there"
+        )
+        return replace(test, warnings=(*test.warnings, warning))
 
     def _mode_of_columns(self) -> str:
         quantities = {column.quantity for column in self.columns}
