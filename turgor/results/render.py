@@ -21,7 +21,8 @@ _STRESS = "von Mises stress / MPa"
 _REFERENCE = "reference"
 _INK, _OUTLINE = "#222222", "#8a8f98"
 _SUBDIVISIONS = 2
-_UPPER_PART = 0.84
+_BAR_PART, _LABEL_PART = 0.16, 0.09
+"""Parts of the picture's height that belong to the colour bar below and to the label above."""
 _EDGE_ANGLE_DEG = 35.0
 
 
@@ -116,10 +117,11 @@ def _save(
 
 
 def _aim(camera: Any, half_height: float, arrays: dict[str, npt.NDArray[Any]]) -> None:
-    """Look at the target, in the upper part of the picture: the lower part belongs to the colour bar."""
+    """Look at the target, between the colour bar and the label."""
+    left = 1.0 - _BAR_PART - _LABEL_PART
     camera.parallel_projection = True
-    camera.parallel_scale = half_height / _UPPER_PART
-    focus = arrays["target"] - (1.0 / _UPPER_PART - 1.0) * half_height * arrays["up"]
+    camera.parallel_scale = half_height / left
+    focus = arrays["target"] - (_BAR_PART - _LABEL_PART) / left * half_height * arrays["up"]
     camera.focal_point = focus
     camera.position = focus + 10.0 * half_height * arrays["towards"]
     camera.up = arrays["up"]
