@@ -79,7 +79,10 @@ def bellows_volumes(bellows):
     assert bellows.height == pytest.approx(z + rho + w / 2)
     (r0, z0), (r1, z1) = np.vstack(profile)[:-1].T, np.vstack(profile)[1:].T
     air = math.pi / 3 * ((r0**2 + r0 * r1 + r1**2) * (z1 - z0)).sum() + math.pi * inlet**2 * w
-    share = 0.25 if bellows.quarter else 1.0
+    if bellows.model == "axisymmetric":
+        (r0, z0), (r1, z1) = np.vstack(profile)[:-1].T, np.vstack(profile)[1:].T
+        return ((r0 + r1) / 2 * (z1 - z0)).sum() + inlet * w, w * sum(length for length, _ in pieces)
+    share = 0.25 if bellows.model == "quarter" else 1.0
     return share * air, share * solid
 
 
@@ -113,8 +116,10 @@ def honeycomb_volumes(comb):
     perimeter = 2 * c * comb.web_length + 4 * (c * r - rooms) * slant
     turns = [(4 * c, slope), (2 * r, tip), (2 * (c - 1), -2 * slope), (2 * (r - 1), -tip)]
     outside = moved(c * r * hexagon + rooms * diamond, perimeter, turns, d)
+    if comb.model == "plane":
+        return c * r * cell, outside - rooms * room - c * r * cell
     air = c * r * cell * (comb.depth - 2 * comb.end_wall)
-    share = 0.5 if comb.symmetric else 1.0
+    share = 0.5 if comb.model == "half" else 1.0
     return share * air, share * ((outside - rooms * room) * comb.depth - air)
 
 
@@ -146,8 +151,8 @@ EXACT = {
 
 # The cheapest variant of each template that still shows all of its features.
 SMALL = {
-    "bellows": {"quarter": True},
-    "honeycomb": {"columns": 2, "rows": 2, "symmetric": True},
+    "bellows": {"model": "quarter"},
+    "honeycomb": {"columns": 2, "rows": 2, "model": "half"},
     "membrane": {"segments": 2},
     "pneunet": {"chambers": 3, "symmetric": True},
     "reinforced-tube": {"symmetric": True},
@@ -169,9 +174,17 @@ def assert_exact(shape, mesh, tolerance):
     assert mesh.volume() == pytest.approx(solid, rel=tolerance)
 
 
-@pytest.fixture(scope="module", params=list(templates()))
+SECTIONS = [("bellows", {"model": "axisymmetric"}), ("honeycomb", {"model": "plane"})]
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(name, SMALL.get(name, {})) for name in templates()] + SECTIONS,
+    ids=lambda choice: "-".join([choice[0], *map(str, choice[1].values())]),
+)
 def small(request):
-    shape = actuator(request.param, **SMALL.get(request.param, {}))
+    name, parameters = request.param
+    shape = actuator(name, **parameters)
     return shape, generate(shape)
 
 
@@ -191,6 +204,15 @@ def test_the_body_is_held_somewhere_and_seen_somewhere(small):
     assert mesh.marker("tip")[0] not in mesh.surface_nodes("mount")
 
 
+def test_the_axis_of_a_section_is_its_axis():
+    mesh = generate(actuator("bellows", model="axisymmetric"))
+    assert mesh.cell_type == "tri6"
+    assert (np.abs(mesh.points[mesh.surface_nodes("axis"), 0]) < 1e-9).all()
+    assert mesh.points[:, 0].min() > -1e-9
+    assert mesh.surface_area("axis") == pytest.approx(1.23)
+    assert mesh.surface_area("mount") == pytest.approx(5.0 - 1.62)
+
+
 def test_symmetry_planes_hold_all_their_nodes(small):
     _, mesh = small
     for name in mesh.surfaces:
@@ -207,12 +229,9 @@ def test_centrelines_run_in_order_without_gaps(small):
     along = mesh.points[nodes] @ (mesh.points[nodes[-1]] - mesh.points[nodes[0]])
     assert (np.diff(along) > 0.0).all()
     # Corner nodes and middle nodes alternate: every third node of an element's edge is there.
-    edges = {frozenset(edge) for cell in mesh.cells for edge in ((cell[a], cell[b]) for a, b in PAIRS)}
+    edges = {frozenset(edge) for cell in mesh.cells for edge in ((cell[a], cell[b]) for a, b in mesh.cell.edges)}
     assert len(nodes) % 2 == 1
     assert all(frozenset(pair) in edges for pair in zip(nodes[:-2:2], nodes[2::2], strict=True))
-
-
-PAIRS = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
 def test_fibres_lie_on_their_helices():
@@ -330,7 +349,12 @@ COUNTS = {
     "reinforced-tube": {"rings": (2, 6)},
     "fibre-tube": {"fibres": (1, 3)},
 }
-SWITCHES = {"pneunet": "symmetric", "bellows": "quarter", "honeycomb": "symmetric", "reinforced-tube": "symmetric"}
+CHOICES = {
+    "pneunet": ("symmetric", (False, True)),
+    "bellows": ("model", ("quarter", "axisymmetric")),
+    "honeycomb": ("model", ("full", "half", "plane")),
+    "reinforced-tube": ("symmetric", (False, True)),
+}
 
 
 @st.composite
@@ -341,8 +365,9 @@ def random_actuator(draw, name):
         parameters[key] = f"{draw(st.floats(low, high)):.3f} {unit}"
     for key, (low, high) in COUNTS.get(name, {}).items():
         parameters[key] = draw(st.integers(low, high))
-    if name in SWITCHES:
-        parameters[SWITCHES[name]] = name == "bellows" or draw(st.booleans())
+    if name in CHOICES:
+        key, choices = CHOICES[name]
+        parameters[key] = draw(st.sampled_from(choices))
     try:
         return actuator(name, **parameters)
     except InputError:

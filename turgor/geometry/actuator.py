@@ -28,16 +28,19 @@ class Shape:
     Parameters
     ----------
     regions
-        Name → tags of volumes.
+        Name → tags of volumes, or of faces if the shape is a section.
     surfaces
-        Name → tags of faces on the outside of the solid.
+        Name → tags of faces on the outside of the solid, or of edges of the section.
     markers
-        Name → points ``(k, 3)`` of a polyline on the drawing's vertices and edges; the nodes on it, in order from
-        its first point to its last, become the marker (one point: the node there).
+        Name → points ``(k, 3)``, of a section ``(k, 2)``, of a polyline on the drawing's vertices and edges; the nodes
+        on it, in order from its first point to its last, become the marker (one point: the node there).
     curves
         Name → points ``(j, 3)`` of a curve embedded in the solid without shaping the mesh (a fibre).
     sizes
         Name of a region or surface → element size in mm there, where it is smaller than elsewhere at the default size.
+    dimension
+        3, or 2 for a section drawn in the plane y = 0, whose coordinates are (x, z): a slice along y, or one half of
+        the section through a body of revolution around z.
     """
 
     regions: Mapping[str, Sequence[int]]
@@ -45,6 +48,7 @@ class Shape:
     markers: Mapping[str, FloatArray] = field(default_factory=dict)
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
     sizes: Mapping[str, float] = field(default_factory=dict)
+    dimension: int = 3
 
 
 @dataclass(frozen=True)

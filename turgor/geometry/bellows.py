@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -24,9 +24,9 @@ class Bellows(Actuator):
     """A body of revolution around z, standing on the plane z = 0, where the inlet opens.
 
     Surfaces ``mount`` (the ring around the inlet), ``tip-face`` (the flat top), ``outer``, ``cavity`` (inside and wall
-    of the inlet, whose rim lies in the plane z = 0, so that the volume is closed) and, of the quarter model,
-    ``symmetry-x`` and ``symmetry-y`` (the cuts x = 0 and y = 0); region ``body``; markers ``base`` (on the inlet's
-    rim) and ``tip`` (centre of the top).
+    of the inlet, whose rim lies in the plane z = 0, so that the volume is closed); of the quarter model ``symmetry-x``
+    and ``symmetry-y`` (the cuts x = 0 and y = 0), of the axisymmetric one ``axis``; region ``body``; markers ``base``
+    (on the inlet's rim) and ``tip`` (centre of the top).
     """
 
     template: ClassVar[str] = "bellows"
@@ -43,12 +43,14 @@ class Bellows(Actuator):
     flank_angle: Angle = parameter("16.26 deg", "slope of the flanks against the horizontal", f"{_ANNEX}: E")
     inlet_radius: PositiveLength = parameter("1.62 mm", "radius of the inlet in the bottom", f"{_ANNEX}: half of B")
     mount_radius: PositiveLength = parameter("5 mm", "outer radius of the ring that is held", _ASSUMED)
-    quarter: bool = parameter(False, "only the quarter x, y ≥ 0", _ASSUMED)
+    model: Literal["full", "quarter", "axisymmetric"] = parameter(
+        "full", "the whole, the quarter x, y ≥ 0, or the section in the plane of radius x and height z", _ASSUMED
+    )
 
     @property
     def default_size(self) -> float:
-        """One element through the wall."""
-        return float(self.wall)
+        """One element through the wall, three in the section, where they cost little."""
+        return float(self.wall if self.model != "axisymmetric" else self.wall / 3.0)
 
     @property
     def height(self) -> float:
@@ -126,7 +128,9 @@ class Bellows(Actuator):
                 Piece(inside[0].start, outside[0].start),
             ]
         )
-        turn = 0.5 * math.pi if self.quarter else 2.0 * math.pi
+        if self.model == "axisymmetric":
+            return self._section(section)
+        turn = 0.5 * math.pi if self.model == "quarter" else 2.0 * math.pi
         swept = occ.revolve([(2, section)], 0, 0, 0, 0, 0, 1, turn)
         occ.remove([(2, section)])
         tip = np.array([[0.0, 0.0, self.height]])
@@ -136,16 +140,28 @@ class Bellows(Actuator):
         return Shape(regions={"body": [body]}, surfaces=surfaces, markers={"base": base, "tip": tip})
 
     def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
-        cuts = {f"symmetry-{axis}": cad.faces_in_plane(faces, axis, 0.0) for axis in "xy" if self.quarter}
-        bottom = cad.faces_in_plane(faces, "z", 0.0)
+        cuts = {f"symmetry-{axis}": cad.faces_in_plane(faces, axis, 0.0) for axis in "xy" if self.model == "quarter"}
+        return self._named(faces, cuts, 3)
+
+    def _section(self, face: int) -> Shape:
+        """Name the section itself, of which only the half x ≥ 0 is there."""
+        tip, base = np.array([[0.0, self.height]]), np.array([[self.inlet_radius, 0.0]])
+        face = cad.with_points(face, [[0.0, 0.0, self.height]], 2)
+        edges = cad.boundary([face], 2)
+        named = self._named(edges, {"axis": cad.faces_in_plane(edges, "x", 0.0, 2)}, 2)
+        return Shape({"body": [face]}, named, {"base": base, "tip": tip}, dimension=2)
+
+    def _named(self, faces: list[int], cuts: dict[str, list[int]], dimension: int) -> dict[str, list[int]]:
+        bottom = cad.faces_in_plane(faces, "z", 0.0, dimension)
         cut = {face for tags in cuts.values() for face in tags}
-        outside, cavity = cad.skins([face for face in faces if face not in cut and face not in bottom])
+        rest = [face for face in faces if face not in cut and face not in bottom]
+        outside, cavity = cad.skins(rest, dimension)
         reach = self.mount_radius * (1 + 1e-6)
 
         def is_ring(low: Any, high: Any) -> bool:
             return bool(max(high[:2]) < reach)
 
-        mount = cad.faces_where(bottom, is_ring)
-        tip = cad.faces_in_plane(outside, "z", self.height)
+        mount = cad.faces_where(bottom, is_ring, dimension)
+        tip = cad.faces_in_plane(outside, "z", self.height, dimension)
         outer = [face for face in outside + bottom if face not in tip + mount]
         return {"mount": mount, "tip-face": tip, "outer": outer, "cavity": cavity, **cuts}

@@ -98,20 +98,23 @@ def sweep(face: int, extent: tuple[float, float, float]) -> int:
     return next(int(tag) for dimension, tag in swept if dimension == 3)
 
 
-def boundary(volumes: Collection[int]) -> list[int]:
-    """Return the faces on the outside of the `volumes` together, in ascending order of their tags."""
-    pairs = [(3, volume) for volume in volumes]
+def boundary(volumes: Collection[int], dimension: int = 3) -> list[int]:
+    """Return the faces on the outside of the `volumes` together, in ascending order of their tags.
+
+    With `dimension` 2 this function and the next ones speak of edges on the outside of faces.
+    """
+    pairs = [(dimension, volume) for volume in volumes]
     return sorted({abs(tag) for _, tag in kernel().model.getBoundary(pairs, combined=True, oriented=False)})
 
 
-def faces_in_plane(faces: Collection[int], axis: str, value: float) -> list[int]:
+def faces_in_plane(faces: Collection[int], axis: str, value: float, dimension: int = 3) -> list[int]:
     """Return the `faces` that lie in the plane where the coordinate along `axis` has the given `value`."""
-    return faces_where(faces, lambda low, high: _close(low, high, AXES[axis], value))
+    return faces_where(faces, lambda low, high: _close(low, high, AXES[axis], value), dimension)
 
 
-def faces_where(faces: Collection[int], test: Callable[[Any, Any], bool]) -> list[int]:
+def faces_where(faces: Collection[int], test: Callable[[Any, Any], bool], dimension: int = 3) -> list[int]:
     """Return the `faces` whose bounding box (lowest corner, highest corner) passes the `test`."""
-    return [face for face in faces if test(*bounds(2, face))]
+    return [face for face in faces if test(*bounds(dimension - 1, face))]
 
 
 def bounds(dimension: int, tag: int) -> tuple[Any, Any]:
@@ -120,13 +123,13 @@ def bounds(dimension: int, tag: int) -> tuple[Any, Any]:
     return box[:3], box[3:]
 
 
-def skins(faces: Collection[int]) -> list[list[int]]:
+def skins(faces: Collection[int], dimension: int = 3) -> list[list[int]]:
     """Group `faces` into sets that hang together by their edges, the one of the largest extent first.
 
     Of a solid's boundary the first set is the outside and every further one is a closed cavity; where symmetry planes
     cut the solid, leave their faces out and the same holds.
     """
-    edges = {face: _edges(face) for face in faces}
+    edges = {face: _sides(dimension - 1, face) for face in faces}
     groups: list[list[int]] = []
     left = sorted(faces)
     while left:
@@ -137,7 +140,7 @@ def skins(faces: Collection[int]) -> list[list[int]]:
             front |= set().union(*(edges[face] for face in joined))
             left = [face for face in left if face not in joined]
         groups.append(sorted(group))
-    return sorted(groups, key=_extent, reverse=True)
+    return sorted(groups, key=lambda group: _extent(dimension - 1, group), reverse=True)
 
 
 def named_skin(faces: Collection[int], axis: str, length: float, symmetric: bool = False) -> dict[str, list[int]]:
@@ -156,21 +159,21 @@ def named_skin(faces: Collection[int], axis: str, length: float, symmetric: bool
     return {**named, "symmetry": symmetry} if symmetric else named
 
 
-def with_points(volume: int, points: Any) -> int:
+def with_points(volume: int, points: Any, dimension: int = 3) -> int:
     """Make the mesh of a `volume` have nodes at `points` ``(k, 3)`` of its skin; synchronise and return its new tag."""
     draw = occ()
     vertices = [(0, draw.addPoint(*point)) for point in points]
-    _, pieces = draw.fragment([(3, volume)], vertices)
+    _, pieces = draw.fragment([(dimension, volume)], vertices)
     draw.synchronize()
     return int(pieces[0][0][1])
 
 
-def _edges(face: int) -> set[int]:
-    return {abs(tag) for _, tag in kernel().model.getBoundary([(2, face)], oriented=False)}
+def _sides(dimension: int, tag: int) -> set[int]:
+    return {abs(side) for _, side in kernel().model.getBoundary([(dimension, tag)], oriented=False)}
 
 
-def _extent(faces: list[int]) -> float:
-    corners = [bounds(2, face) for face in faces]
+def _extent(dimension: int, tags: list[int]) -> float:
+    corners = [bounds(dimension, tag) for tag in tags]
     low = np.min([corner[0] for corner in corners], axis=0)
     high = np.max([corner[1] for corner in corners], axis=0)
     return float(np.linalg.norm(high - low))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
-from turgor.geometry.path import rounded_polygon
+from turgor.geometry.path import Piece, rounded_polygon
 
 _PAPER = "Design and Analysis of a Hyperelastic Pneumatic Honeycomb Network Made of Ecoflex 00-35, section 3.1"
 _ASSUMED = "assumed"
@@ -46,11 +46,17 @@ class Honeycomb(Actuator):
     rounding: PositiveLength = parameter("0.5 mm", "radius of all corners", f"{_PAPER} ties it to d; half of d assumed")
     depth: PositiveLength = parameter("20 mm", "extent along y, end walls included", _ASSUMED)
     end_wall: PositiveLength = parameter("1 mm", "thickness of the walls that close the cells along y", _ASSUMED)
-    symmetric: bool = parameter(False, "only the half y ≥ 0, with the surface 'symmetry'", _ASSUMED)
+    model: Literal["full", "half", "plane"] = parameter(
+        "full",
+        "the whole, the half y ≥ 0 with the surface 'symmetry', or the section in the plane of x and z",
+        _ASSUMED,
+    )
 
     @property
     def default_size(self) -> float:
-        """One flat element through the walls, twice as long as thick."""
+        """One flat element through the walls, twice as long as thick; two in the section, where they cost little."""
+        if self.model == "plane":
+            return float(0.5 * self.thickness)
         return float(2.0 * min(self.thickness, self.end_wall))
 
     @property
@@ -107,38 +113,63 @@ class Honeycomb(Actuator):
         return [*below, *right[1:], *above[1:], *left[1:-1]]
 
     def draw(self) -> Shape:
-        """Sweep the outside with its open rooms along y and cut the cells out of it."""
-        occ = cad.occ()
-        half, radius = 0.5 * self.thickness, self.rounding
-        begin, end = (0.0 if self.symmetric else -0.5 * self.depth), 0.5 * self.depth
-        rooms = [
-            rounded_polygon(self._room(column, row), half, radius)
-            for column in range(1, self.columns)
-            for row in range(1, self.rows)
-        ]
-        solid = cad.sweep(cad.plane_face(rounded_polygon(self._outside(), -half, radius), *rooms), (0, end - begin, 0))
-        occ.translate([(3, solid)], 0, begin, 0)
-        front = begin if self.symmetric else begin + self.end_wall
-        air = []
-        for column in range(self.columns):
-            for row in range(self.rows):
-                face = cad.plane_face(rounded_polygon(self._cell(column, row), half, radius))
-                air.append((3, cad.sweep(face, (0, end - self.end_wall - front, 0))))
-        occ.translate(air, 0, front, 0)
-        (body,), _ = occ.cut([(3, solid)], air)
+        """Draw the network in its plane or swept along y, with the cells as holes or closed by end walls."""
         middle = (self.columns // 2 + 0.5) * self.cell_width
         ends = np.array([[middle, 0.0, 0.0], [middle, 0.0, self.height]])
-        body = cad.with_points(body[1], ends)
-        return Shape({"body": [body]}, self._surfaces(cad.boundary([body])), {"base": ends[:1], "tip": ends[1:]})
+        flat = self.model == "plane"
+        body = cad.with_points(self._section() if flat else self._solid(), ends, 2 if flat else 3)
+        places = ends[:, [0, 2]] if flat else ends
+        return Shape(
+            regions={"body": [body]},
+            surfaces=self._surfaces(body, 2 if flat else 3),
+            markers={"base": places[:1], "tip": places[1:]},
+            dimension=2 if flat else 3,
+        )
 
-    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
-        symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.symmetric else []
-        outside, *cells = cad.skins([face for face in faces if face not in symmetry])
-        mount, tip = (cad.faces_in_plane(outside, "z", z) for z in (0.0, self.height))
-        columns: dict[str, list[int]] = {f"cavity-{number + 1}": [] for number in range(self.columns)}
-        for cell in cells:
-            left = min(cad.bounds(2, face)[0][0] for face in cell)
-            columns[f"cavity-{int(left // self.cell_width) + 1}"] += cell
+    def _contours(self) -> tuple[list[Piece], list[list[Piece]], list[list[Piece]]]:
+        """Return the contours of the outside, of the open rooms and of the cells."""
+        half, radius, columns, rows = 0.5 * self.thickness, self.rounding, range(self.columns), range(self.rows)
+        rooms = [self._room(column, row) for column in columns[1:] for row in rows[1:]]
+        cells = [self._cell(column, row) for column in columns for row in rows]
+        return (
+            rounded_polygon(self._outside(), -half, radius),
+            [rounded_polygon(room, half, radius) for room in rooms],
+            [rounded_polygon(cell, half, radius) for cell in cells],
+        )
+
+    def _section(self) -> int:
+        outside, rooms, cells = self._contours()
+        return cad.plane_face(outside, *rooms, *cells)
+
+    def _solid(self) -> int:
+        """Sweep the outside with its open rooms along y and cut the cells out of it."""
+        occ = cad.occ()
+        outside, rooms, cells = self._contours()
+        halved = self.model == "half"
+        begin, end = (0.0 if halved else -0.5 * self.depth), 0.5 * self.depth
+        solid = cad.sweep(cad.plane_face(outside, *rooms), (0, end - begin, 0))
+        front, back = (begin if halved else begin + self.end_wall), end - self.end_wall
+        air = [(3, cad.sweep(cad.plane_face(cell), (0, back - front, 0))) for cell in cells]
+        occ.translate([(3, solid)], 0, begin, 0)
+        occ.translate(air, 0, front, 0)
+        (body,), _ = occ.cut([(3, solid)], air)
+        return int(body[1])
+
+    def _surfaces(self, body: int, dimension: int) -> dict[str, list[int]]:
+        faces = cad.boundary([body], dimension)
+        symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.model == "half" else []
+        outside, *pockets = cad.skins([face for face in faces if face not in symmetry], dimension)
+        mount, tip = (cad.faces_in_plane(outside, "z", z, dimension) for z in (0.0, self.height))
         outer = [face for face in outside if face not in mount + tip]
+        columns: dict[str, list[int]] = {f"cavity-{number + 1}": [] for number in range(self.columns)}
+        for pocket in pockets:
+            corners = np.array([cad.bounds(dimension - 1, face) for face in pocket])
+            place = 0.5 * (corners[:, 0, 0].min() + corners[:, 1, 0].max()) / self.cell_width
+            # Cells are centred between two columns' borders; the open rooms of the section, which have no end faces
+            # to join them to the outside, are centred on the borders.
+            if abs(place - round(place)) > 0.25:
+                columns[f"cavity-{int(place) + 1}"] += pocket
+            else:
+                outer += pocket
         named = {"mount": mount, "tip-face": tip, "outer": outer, **columns, "symmetry": symmetry}
         return {name: tags for name, tags in named.items() if tags}

@@ -13,9 +13,10 @@ from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape
+from turgor.mesh.cells import CELLS, body_cell
 from turgor.mesh.faces import outward_faces
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.tet10 import EDGES, FloatArray, IntArray, jacobian_coefficients
+from turgor.mesh.tet10 import FloatArray, IntArray, jacobian_coefficients
 
 LOG = logger("mesh")
 
@@ -25,12 +26,15 @@ Progress = Callable[[str], None]
 MOST_CELLS = 3_000_000
 """Meshes beyond this are refused; they need more than ten gigabytes before the first step."""
 
+PER_CIRCLE_OF_SECTION = 16
+"""Elements along a full circle of a section by default, whatever the template takes in space."""
+
 LEAST_DISTORTION = 0.1
 """Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
 _HALVINGS = 4
 
 # gmsh's numbers for these elements, and its tetrahedron's nodes in our order.
-_TET10, _TRI6 = 11, 9
+_TET10, _TRI6, _LINE3 = 11, 9, 8
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
@@ -42,7 +46,7 @@ def generate(
     per_circle: int | None = None,
     progress: Progress = LOG.info,
 ) -> Mesh:
-    """Mesh an actuator with curved ten-node tetrahedra, all of them valid.
+    """Mesh an actuator with curved ten-node tetrahedra, or a section with six-node triangles, all of them valid.
 
     The same actuator and size give the same mesh to the last bit on the same machine and version of gmsh.
 
@@ -86,7 +90,9 @@ def generate(
         _set_local_sizes(gmsh, shape, local)
         _check_count(gmsh, chosen)
         progress(f"meshing with elements of {chosen:g} mm")
-        _tetrahedralise(gmsh, chosen, actuator.per_circle if per_circle is None else per_circle)
+        circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
+        circle = circle if per_circle is None else per_circle
+        _divide(gmsh, chosen, circle, shape.dimension)
         progress("curving")
         return _named_mesh(gmsh, shape, _curved(gmsh, shape))
 
@@ -111,8 +117,9 @@ def _set_local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float])
             raise InputError("the shape has no region or surface of this name", key=f"sizes.{name}", expected=expected)
         limit = field.add("Constant")
         field.setNumber(limit, "VIn", size)
-        field.setNumbers(limit, "VolumesList", shape.regions.get(name, []))
-        field.setNumbers(limit, "SurfacesList", shape.surfaces.get(name, []))
+        regions, surfaces = ("VolumesList", "SurfacesList") if shape.dimension == 3 else ("SurfacesList", "CurvesList")
+        field.setNumbers(limit, regions, shape.regions.get(name, []))
+        field.setNumbers(limit, surfaces, shape.surfaces.get(name, []))
         limits.append(limit)
     if limits:
         smallest = field.add("Min")
@@ -132,12 +139,13 @@ def _check_count(gmsh: ModuleType, size: float) -> None:
         raise InputError(problem, key="size", value=f"{size:g} mm", expected=expected)
 
 
-def _tetrahedralise(gmsh: ModuleType, size: float, per_circle: int) -> None:
+def _divide(gmsh: ModuleType, size: float, per_circle: int, dimension: int) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", per_circle)
     try:
-        gmsh.model.mesh.generate(3)
-        gmsh.model.mesh.optimize("Netgen")
+        gmsh.model.mesh.generate(dimension)
+        if dimension == 3:
+            gmsh.model.mesh.optimize("Netgen")
     except Exception as error:  # gmsh raises bare Exceptions that carry its own text
         problem = f"gmsh cannot mesh this shape: {error}"
         raise InputError(problem, key="size", value=f"{size:g} mm", expected="a smaller size") from error
@@ -158,8 +166,9 @@ def _curved(gmsh: ModuleType, shape: Shape) -> _Cells:
 
 
 def _read_cells(gmsh: ModuleType, shape: Shape) -> _Cells:
+    kind, order = (_TET10, _GMSH_TO_VTK) if shape.dimension == 3 else (_TRI6, list(range(6)))
     blocks = {
-        name: np.concatenate([gmsh.model.mesh.getElementsByType(_TET10, tag)[1] for tag in tags]).reshape(-1, 10)
+        name: np.vstack([gmsh.model.mesh.getElementsByType(kind, tag)[1].reshape(-1, len(order)) for tag in tags])
         for name, tags in shape.regions.items()
     }
     tags, cells = np.unique(np.vstack(list(blocks.values())), return_inverse=True)
@@ -172,14 +181,22 @@ def _read_cells(gmsh: ModuleType, shape: Shape) -> _Cells:
         name: np.arange(start, end, dtype=np.int32)
         for name, start, end in zip(blocks, ends[:-1], ends[1:], strict=True)
     }
-    return _Cells(points, cells.reshape(-1, 10)[:, _GMSH_TO_VTK].astype(np.int32), regions, index)
+    # What lies in a coordinate plane lies in it exactly: a symmetry plane or an axis depends on it.
+    points[np.abs(points) < 1e-10 * np.ptp(points, axis=0).max()] = 0.0
+    cells = cells.reshape(-1, len(order))[:, order]
+    if shape.dimension == 2:
+        points = points[:, [0, 2]]
+        clockwise = jacobian_coefficients(points[cells]).mean(axis=1) < 0.0
+        cells[clockwise] = cells[clockwise][:, CELLS["tri6"].mirrored]
+    return _Cells(points, np.asarray(cells, dtype=np.int32), regions, index)
 
 
 def _named_mesh(gmsh: ModuleType, shape: Shape, mesh: _Cells) -> Mesh:
     surfaces = {}
-    for name, faces in shape.surfaces.items():
-        triangles = [gmsh.model.mesh.getElementsByType(_TRI6, face)[1].reshape(-1, 6) for face in faces]
-        surfaces[name] = outward_faces(mesh.cells, mesh.index[np.vstack(triangles)[:, :3]])
+    kind, nodes = (_TRI6, 6) if shape.dimension == 3 else (_LINE3, 3)
+    for name, tags in shape.surfaces.items():
+        faces = np.vstack([gmsh.model.mesh.getElementsByType(kind, tag)[1].reshape(-1, nodes) for tag in tags])
+        surfaces[name] = outward_faces(mesh.cells, mesh.index[faces[:, : shape.dimension]])
     markers = {name: nodes_on_polyline(mesh.points, line, name) for name, line in shape.markers.items()}
     return Mesh(mesh.points, mesh.cells, mesh.regions, surfaces, markers, shape.curves)
 
@@ -190,7 +207,7 @@ def untangled(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
     Parameters
     ----------
     points, cells
-        Shapes ``(n, 3)`` and ``(m, 10)``.
+        Shapes ``(n, 3)`` and ``(m, 10)``, or ``(n, 2)`` and ``(m, 6)``.
 
     Returns
     -------
@@ -205,18 +222,19 @@ def untangled(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:
     """
     points = points.copy()
     rounds = np.zeros(len(cells), dtype=np.int64)
-    first, second = np.array(EDGES).T
+    first, second = np.array(body_cell(cells).edges).T
+    corners = body_cell(cells).n_corners
     while (spoilt := _is_spoilt(points[cells])).any():
         if (rounds[spoilt] > _HALVINGS).any():
             cell = int(np.flatnonzero(spoilt & (rounds > _HALVINGS))[0])
-            place = points[cells[cell, :4]].mean(axis=0).round(2).tolist()
+            place = points[cells[cell, :corners]].mean(axis=0).round(2).tolist()
             raise InputError(f"gmsh left an element inside out near {place} mm", key="size", expected="a smaller size")
         # A middle node belongs to several cells and must move once; a neighbour that this spoils has its turn next.
-        straight = 0.5 * (points[cells[spoilt][:, first]] + points[cells[spoilt][:, second]]).reshape(-1, 3)
-        middles, place_of = np.unique(cells[spoilt, 4:], return_index=True)
+        straight = 0.5 * (points[cells[spoilt][:, first]] + points[cells[spoilt][:, second]])
+        middles, place_of = np.unique(cells[spoilt, corners:], return_index=True)
         share = np.zeros(len(points))
-        np.maximum.at(share, cells[spoilt, 4:], np.where(rounds[spoilt] < _HALVINGS, 0.5, 1.0)[:, None])
-        points[middles] += share[middles, None] * (straight[place_of] - points[middles])
+        np.maximum.at(share, cells[spoilt, corners:], np.where(rounds[spoilt] < _HALVINGS, 0.5, 1.0)[:, None])
+        points[middles] += share[middles, None] * (straight.reshape(-1, points.shape[1])[place_of] - points[middles])
         rounds[spoilt] += 1
     return points, int((rounds > 0).sum())
 
@@ -233,9 +251,9 @@ def nodes_on_polyline(points: FloatArray, line: FloatArray, name: str) -> IntArr
     Parameters
     ----------
     points
-        Shape ``(n, 3)``.
+        Shape ``(n, d)``.
     line
-        Shape ``(k, 3)``; a single point asks for the node there.
+        Shape ``(k, d)``; a single point asks for the node there.
     name
         For the message.
 

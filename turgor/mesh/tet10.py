@@ -1,4 +1,4 @@
-"""Bounds on the Jacobian of curved ten-node tetrahedra, and their exact volumes."""
+"""Bounds on the Jacobian of curved ten-node tetrahedra and six-node triangles, and their exact volumes."""
 
 from __future__ import annotations
 
@@ -21,38 +21,40 @@ FACES = CELLS["tet10"].faces
 
 
 def jacobian_determinants(nodes: FloatArray, points: FloatArray) -> FloatArray:
-    """Return det ∂x/∂ξ, shape ``(m, q)``, of elements with `nodes` ``(m, 10, 3)`` at reference `points` ``(q, 3)``."""
-    return determinants(jacobians(nodes, CELLS["tet10"], points))
+    """Return det ∂x/∂ξ ``(m, q)`` of elements with `nodes` ``(m, n_nodes, d)`` at reference `points` ``(q, d)``."""
+    return determinants(jacobians(nodes, CELLS["tet10" if nodes.shape[1] == 10 else "tri6"], points))
 
 
 @functools.cache
-def _bernstein() -> tuple[FloatArray, FloatArray]:
-    """Lattice points of the cubic tetrahedron ``(20, 3)`` and the map from values there to Bézier coefficients."""
-    exponents = np.array([e for e in itertools.product(range(4), repeat=4) if sum(e) == 3])
+def _bernstein(dimension: int) -> tuple[FloatArray, FloatArray]:
+    """Lattice points of the simplex whose order is its dimension, and the map from values there to coefficients."""
+    powers = itertools.product(range(dimension + 1), repeat=dimension + 1)
+    exponents = np.array([e for e in powers if sum(e) == dimension])
     factorial = np.array([1.0, 1.0, 2.0, 6.0])
-    multinomial = 6.0 / factorial[exponents].prod(axis=1)
-    lattice = exponents / 3.0
+    multinomial = factorial[dimension] / factorial[exponents].prod(axis=1)
+    lattice = exponents / dimension
     values = multinomial * np.prod(lattice[:, None, :] ** exponents[None, :, :], axis=2)
     return lattice[:, 1:], np.linalg.inv(values)
 
 
 def jacobian_coefficients(nodes: FloatArray) -> FloatArray:
-    """Return the 20 Bézier coefficients of det ∂x/∂ξ of each element.
+    """Return the Bézier coefficients of det ∂x/∂ξ of each element.
 
-    The determinant is a cubic polynomial, a convex combination of these coefficients everywhere in the element: their
-    minimum bounds it from below (Johnen, Remacle and Geuzaine, 2013), and their mean is six times the volume.
+    The determinant is a polynomial, cubic in a tetrahedron and quadratic in a triangle, and everywhere in the element a
+    convex combination of these coefficients: their minimum bounds it from below (Johnen, Remacle and Geuzaine, 2013),
+    and their mean is six times the volume or twice the area.
 
     Parameters
     ----------
     nodes
-        Shape ``(m, 10, 3)``.
+        Shape ``(m, 10, 3)`` or ``(m, 6, 2)``.
 
     Returns
     -------
     ndarray
-        Shape ``(m, 20)``.
+        Shape ``(m, 20)`` or ``(m, 6)``.
     """
-    lattice, to_bezier = _bernstein()
+    lattice, to_bezier = _bernstein(nodes.shape[2])
     return jacobian_determinants(nodes, lattice) @ to_bezier.T
 
 
