@@ -4,7 +4,7 @@ import pytest
 from turgor.common.errors import InputError
 from turgor.mesh.files import read, write
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.structured import shell_octant
+from turgor.mesh.structured import box, quarter_ring, shell_octant
 
 SPIRAL = np.array([[1.2, 0.1, 0.1], [1.0, 0.7, 0.2], [0.8, 0.9, 0.4]])
 
@@ -39,6 +39,26 @@ def test_a_mesh_comes_back_with_all_its_names(mesh, suffix, tmp_path):
         assert list(before) == list(after)
         for name in before:
             np.testing.assert_array_equal(after[name], before[name], err_msg=name)
+
+
+OTHER_CELLS = {
+    "hex27": lambda: box((2.0, 1.0, 1.0), (2, 1, 1), "hex27"),
+    "tri6": lambda: quarter_ring(1.0, 1.5, 1, "tri6"),
+    "quad9": lambda: quarter_ring(1.0, 1.5, 1, "quad9"),
+}
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".vtu"])
+@pytest.mark.parametrize("make", OTHER_CELLS.values(), ids=OTHER_CELLS)
+def test_other_kinds_of_cells_come_back_too(make, suffix, tmp_path):
+    mesh = make()
+    path = tmp_path / f"mesh{suffix}"
+    write(mesh, path)
+    back = read(path)
+    np.testing.assert_array_equal(back.points, mesh.points)
+    np.testing.assert_array_equal(back.cells, mesh.cells)
+    for name in mesh.surfaces:
+        assert {tuple(sorted(face)) for face in back.surface(name)} == {tuple(sorted(f)) for f in mesh.surface(name)}
 
 
 @pytest.mark.parametrize("suffix", [".msh", ".vtu"])

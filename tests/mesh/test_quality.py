@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.quality import quality
 from turgor.mesh.structured import box, shell_octant
@@ -50,6 +51,11 @@ def test_distortion_sees_a_bent_edge_and_says_where():
     summary = measured.summary()
     assert summary["elements"] == 48
     assert summary["worst_place_mm"] == measured.centres[measured.worst_cell].round(3).tolist()
+
+
+def test_only_tetrahedra_are_measured():
+    with pytest.raises(InputError, match=r"not measured \(found 'hex27'\)"):
+        quality(box((1.0, 1.0, 1.0), (1, 1, 1), "hex27"))
 
 
 def test_curved_elements_of_a_shell_are_good():

@@ -1,9 +1,10 @@
 """Mesh files: write and read a mesh with all its names, as gmsh's .msh or VTK's .vtu.
 
-In a file a region is a set of ten-node tetrahedra, a surface of six-node triangles, a marker of vertices and a curve of
-lines between points of its own. In gmsh's format each is a physical group called ``region:body`` (the kind is written
-out since a region and a marker may share a name; without it the group's dimension decides). In VTK's, where cells have
-no sets, each is a cell array of that name, 1 on its cells and 0 elsewhere, by which ParaView can threshold.
+In a file a region is a set of cells, a surface of their faces, a marker of vertices and a curve of lines between
+points of its own; a plane mesh lies in the plane of x and y. In gmsh's format each is a physical group called
+``region:body`` (the kind is written out since a region and a marker may share a name; without it the group's dimension
+decides). In VTK's, where cells have no sets, each is a cell array of that name, 1 on its cells and 0 elsewhere, by
+which ParaView can threshold.
 """
 
 from __future__ import annotations
@@ -16,12 +17,22 @@ import meshio
 import numpy as np
 
 from turgor.common.errors import InputError
+from turgor.mesh.cells import body_cell, face_cell, is_body_cell
 from turgor.mesh.faces import outward_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import FloatArray, IntArray
 
-_KINDS = {"region": "tetra10", "surface": "triangle6", "marker": "vertex", "curve": "line"}
-_DIMENSIONS = {"region": 3, "surface": 2, "marker": 0, "curve": 1}
+# Number of nodes of a cell or face → what it is called in meshio, and its dimension.
+_TYPES = {
+    1: ("vertex", 0),
+    2: ("line", 1),
+    3: ("line3", 1),
+    6: ("triangle6", 2),
+    9: ("quad9", 2),
+    10: ("tetra10", 3),
+    27: ("hexahedron27", 3),
+}
+_KIND_OF_DIMENSION = {3: "region", 2: "surface", 1: "curve", 0: "marker"}
 
 Sets = dict[tuple[str, str], IntArray]
 """Kind and name of each set → nodes of its cells, one row a cell."""
@@ -45,7 +56,7 @@ def write(mesh: Mesh, path: str | Path) -> None:
 
 
 def read(path: str | Path) -> Mesh:
-    """Read a mesh with its names from a .msh or .vtu file of ten-node tetrahedra.
+    """Read a mesh with its names from a .msh or .vtu file of second-order cells.
 
     Raises
     ------
@@ -72,11 +83,12 @@ def _to_sets(mesh: Mesh) -> tuple[FloatArray, Sets]:
     sets: Sets = {("region", name): mesh.cells[cells] for name, cells in mesh.regions.items()}
     sets |= {("surface", name): triangles for name, triangles in mesh.surfaces.items()}
     sets |= {("marker", name): nodes[:, None] for name, nodes in mesh.markers.items()}
-    points = [mesh.points]
+    flat = 3 - mesh.dimension
+    points = [np.pad(mesh.points, ((0, 0), (0, flat)))]
     for name, curve in mesh.curves.items():
         start = sum(len(block) for block in points) + np.arange(len(curve) - 1, dtype=np.int32)
         sets["curve", name] = np.column_stack([start, start + 1])
-        points.append(curve)
+        points.append(np.pad(curve, ((0, 0), (0, flat))))
     return np.vstack(points), sets
 
 
@@ -88,8 +100,15 @@ def _from_sets(points: FloatArray, sets: Sets) -> Mesh:
         regions[name] = np.arange(start, start + len(cells), dtype=np.int32)
         blocks.append(cells)
     if not blocks:
-        raise InputError("the file names no region of ten-node tetrahedra")
+        raise InputError("the file names no region of second-order cells")
+    if len({block.shape[1] for block in blocks}) > 1:
+        raise InputError("the file mixes cells of several kinds")
     cells = np.vstack(blocks)
+    if not is_body_cell(cells.shape[1]):
+        raise InputError(
+            "the regions of the file are of no kind of cell that is known", value=_TYPES[cells.shape[1]][0]
+        )
+    points = points[:, : body_cell(cells).dimension]
     used = np.unique(cells)
     index = np.full(len(points), -1, dtype=np.int32)
     index[used] = np.arange(len(used))
@@ -98,7 +117,10 @@ def _from_sets(points: FloatArray, sets: Sets) -> Mesh:
         points[used],
         cells,
         regions,
-        {name: outward_faces(cells, index[triangles[:, :3]]) for name, triangles in _of_kind(sets, "surface")},
+        {
+            name: outward_faces(cells, index[faces[:, : face_cell(faces).n_corners]])
+            for name, faces in _of_kind(sets, "surface")
+        },
         {name: index[nodes[:, 0]] for name, nodes in _of_kind(sets, "marker")},
         {name: points[np.append(lines[:, 0], lines[-1, 1])] for name, lines in _of_kind(sets, "curve")},
     )
@@ -108,32 +130,40 @@ def _of_kind(sets: Sets, wanted: str) -> Iterator[tuple[str, IntArray]]:
     return ((name, cells) for (kind, name), cells in sets.items() if kind == wanted)
 
 
+def _blocks(sets: Sets) -> list[tuple[str, IntArray]]:
+    return [(_TYPES[cells.shape[1]][0], cells) for cells in sets.values()]
+
+
 def _write_msh(path: Path, points: FloatArray, sets: Sets) -> None:
     numbers = [np.full(len(cells), number) for number, cells in enumerate(sets.values(), start=1)]
-    names = {f"{kind}:{name}": np.array([n, _DIMENSIONS[kind]]) for n, (kind, name) in enumerate(sets, start=1)}
-    blocks = [(_KINDS[kind], cells) for (kind, _), cells in sets.items()]
+    names = {
+        f"{kind}:{name}": np.array([number, _TYPES[cells.shape[1]][1]])
+        for number, ((kind, name), cells) in enumerate(sets.items(), start=1)
+    }
+    blocks = _blocks(sets)
     data = {"gmsh:physical": numbers, "gmsh:geometrical": numbers}
     meshio.gmsh.write(path, meshio.Mesh(points, blocks, cell_data=data, field_data=names), "2.2", binary=True)
 
 
 def _read_msh(path: Path) -> tuple[FloatArray, Sets]:
     stored = meshio.gmsh.read(path)
-    kinds = {dimension: kind for kind, dimension in _DIMENSIONS.items()}
+    known = dict(_TYPES.values())
     sets: Sets = {}
-    for name, (number, dimension) in stored.field_data.items():
-        kind = kinds[int(dimension)]
+    for label, (number, dimension) in stored.field_data.items():
+        kind, colon, name = label.rpartition(":")
         blocks = [
             block.data[physical == number]
             for block, physical in zip(stored.cells, stored.cell_data["gmsh:physical"], strict=True)
-            if block.type == _KINDS[kind]
+            if known.get(block.type) == dimension
         ]
+        blocks = [block for block in blocks if len(block)]
         if blocks:
-            sets[kind, name.removeprefix(f"{kind}:")] = np.vstack(blocks).astype(np.int32)
+            sets[kind if colon else _KIND_OF_DIMENSION[int(dimension)], name] = np.vstack(blocks).astype(np.int32)
     return stored.points, sets
 
 
 def _write_vtu(path: Path, points: FloatArray, sets: Sets) -> None:
-    blocks = [(_KINDS[kind], cells) for (kind, _), cells in sets.items()]
+    blocks = _blocks(sets)
     data: dict[str, list[Any]] = {
         f"{kind}:{name}": [np.full(len(block), int(key == (kind, name)), np.int8) for key, block in sets.items()]
         for kind, name in sets
@@ -146,14 +176,12 @@ def _read_vtu(path: Path) -> tuple[FloatArray, Sets]:
     sets: Sets = {}
     for array, values in stored.cell_data.items():
         kind, _, name = array.partition(":")
-        if kind not in _KINDS:
+        if kind not in _KIND_OF_DIMENSION.values():
             continue
-        blocks = [
-            block.data[flag != 0]
-            for block, flag in zip(stored.cells, values, strict=True)
-            if block.type == _KINDS[kind]
-        ]
-        sets[kind, name] = np.vstack(blocks).astype(np.int32)
+        blocks = [block.data[flag != 0] for block, flag in zip(stored.cells, values, strict=True)]
+        blocks = [block for block in blocks if len(block)]
+        if blocks:
+            sets[kind, name] = np.vstack(blocks).astype(np.int32)
     return stored.points, sets
 
 

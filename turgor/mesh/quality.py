@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turgor.mesh.cells import CELLS, jacobians
+from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import FloatArray, jacobian_coefficients
 
@@ -59,7 +60,9 @@ class Quality:
 
 
 def quality(mesh: Mesh) -> Quality:
-    """Measure every element of a mesh."""
+    """Measure every element of a mesh of tetrahedra; raise InputError for another one."""
+    if mesh.cell_type != "tet10":
+        raise InputError("the quality of these cells is not measured", value=mesh.cell_type, expected="tet10")
     nodes = mesh.points[mesh.cells]
     corners = nodes[:, :4]
     coefficients = jacobian_coefficients(nodes)
