@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turgor.mesh.cells import CELLS, jacobians
 from turgor.common.errors import InputError
+from turgor.mesh.cells import CELLS, jacobians
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import FloatArray, jacobian_coefficients
 
