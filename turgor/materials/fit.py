@@ -32,6 +32,10 @@ PLAUSIBLE_RATIOS = {1.5: (1.0, 1.5), 2.0: (0.95, 1.8)}
 SEARCHED_WHEN_CONSTRAINED = 2
 """Models with more constants to search for are constrained on request only: it takes them seconds."""
 
+SAMPLES_OF_STABILITY = (24, 200)
+"""Stretches of each mode at which a constrained fit keeps stability; the finer ones where it is lost in between and
+the model is linear, for that takes no time."""
+
 RELATIVE_FLOOR = 0.02
 """With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
 
@@ -112,12 +116,7 @@ def _kinds(names: Model | Sequence[Model]) -> list[type[Hyperelastic]]:
         raise InputError("no model is named", key="models", expected="names of models, or all")
     found: list[type[Hyperelastic]] = []
     for name in chosen:
-        if isinstance(name, type):
-            found.append(name)
-        elif name == "all":
-            found.extend(known_models().values())
-        else:
-            found.append(find_model(name))
+        found.extend(known_models().values() if name == "all" else [find_model(name)])
     return list(dict.fromkeys(found))
 
 
@@ -199,18 +198,22 @@ def _fits_of(
         expected = "prefer, require or ignore"
         raise InputError("unknown choice", key="stability", value=stability, expected=expected)
     biaxial_measured = any(test.mode in ("equibiaxial", "planar") for test in problem.tests)
-    limits = Limits(stretch, biaxial={} if biaxial_measured else PLAUSIBLE_RATIOS)
     found = []
     if stability != "require":
         plain = solve(kind, problem)
         if plain is not None:
             found.append(_judged(kind, problem, plain, stretch, volumetric, constrained=False))
-    quick = sum(not constant.linear for constant in kind.constants()) <= SEARCHED_WHEN_CONSTRAINED
+    searched = sum(not constant.linear for constant in kind.constants())
+    quick = searched <= SEARCHED_WHEN_CONSTRAINED
     wanted = stability == "require" or (stability == "prefer" and quick and found and found[0].objections)
     if wanted:
-        kept = solve(kind, problem, limits)
-        judged = None if kept is None else _judged(kind, problem, kept, stretch, volumetric, constrained=True)
-        if judged is not None and judged.material is not None:
+        ratios = {} if biaxial_measured else PLAUSIBLE_RATIOS
+        for samples in SAMPLES_OF_STABILITY:
+            kept = solve(kind, problem, Limits(stretch, biaxial=ratios, samples=samples))
+            judged = None if kept is None else _judged(kind, problem, kept, stretch, volumetric, constrained=True)
+            if judged is None or judged.stable or (searched and stability == "prefer"):
+                break
+        if judged is not None and judged.stable:
             found.append(judged)
     return found
 

@@ -28,6 +28,9 @@ GOOD_ENOUGH = 0.0045
 """RMSE relative to the largest stress below which fewer constants are worth more than a closer fit: batches of the
 same elastomer differ by 10 % and more."""
 
+LEAST_R2 = 0.5
+"""A fit that explains less of the tests' variance does not follow them."""
+
 CLOSE_TO_BEST = 1.35
 """RMSE relative to the best usable fit's below which fewer constants are worth more than a closer fit."""
 
@@ -259,9 +262,9 @@ def recommend(fits: Sequence[Fit], largest_stress: float) -> tuple[Fit | None, s
     :data:`GOOD_ENOUGH` of the largest stress, the one with the fewest constants; if there is none, of those below
     :data:`CLOSE_TO_BEST` times the best one's.
     """
-    usable = [fit for fit in fits if fit.stable]
+    usable = [fit for fit in fits if fit.stable and fit.r2 > LEAST_R2]
     if not usable:
-        return None, "no fit is stable in the range of the tests"
+        return None, "no fit that is stable in the range of the tests follows them"
     fewest = min(len(fit.objections) for fit in usable)
     usable = [fit for fit in usable if len(fit.objections) == fewest]
     closest = min(fit.rmse for fit in usable)

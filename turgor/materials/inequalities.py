@@ -18,9 +18,7 @@ from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.kinematics import Array
 from turgor.materials.stability import MODES, drucker_matrix, principal_stretches
 
-_SAMPLES = 24
 _ROUNDS = 30
-_DIRECTIONS = np.array([[1.0, 0.0], [0.0, 1.0], [0.7, -0.7], [0.7, 0.7]])
 _AT_REST = np.array([1.0, -1.0]) / 2.0
 """(1, −1) D (1, −1)ᵀ of the undeformed body is 4 μ: so scaled, it is μ."""
 
@@ -39,12 +37,15 @@ class Limits:
         Bounds of the ratio of equibiaxial to uniaxial nominal stress by stretch; empty where it is measured.
     cancellation
         No modulus adds more than so many times the measured stress: four digits then fix the response.
+    samples
+        Stretches of each mode at which stability is kept.
     """
 
     largest_stretch: float
     margin: float = 0.02
     biaxial: Mapping[float, tuple[float, float]] = field(default_factory=dict)
     cancellation: float = 8.0
+    samples: int = 24
 
     def enforce(
         self, A: Array, y: Array, free: Array, units: Sequence[Hyperelastic], norms: Array, rows: Array, floors: Array
@@ -73,12 +74,11 @@ class Limits:
         scale = np.abs(matrices).max(axis=(1, 2, 3))
         if np.all(self._violation(matrices, mu, free) <= 1e-9 * scale) and np.all(fixed @ free >= floor):
             return free
-        every = np.einsum("vi,skij,vj->svk", _DIRECTIONS, matrices, _DIRECTIONS) - self.margin * mu
-        G, h = np.vstack([fixed, every.reshape(-1, n)]), np.concatenate([floor, np.zeros(every.shape[0] * 4)])
+        G, h = fixed, floor
+        x = least_squares_above(A, y, G, h)
+        if x is None:
+            return None
         for _ in range(_ROUNDS):
-            x = least_squares_above(A, y, G, h)
-            if x is None:
-                return None
             values, vectors = np.linalg.eigh(np.einsum("skij,k->sij", matrices, x))
             violated = values[:, 0] < self.margin * float(mu @ x) - 1e-9 * scale * np.abs(x).max()
             if not np.any(violated):
@@ -86,6 +86,10 @@ class Limits:
             v = vectors[violated, :, 0]
             cuts = np.einsum("si,skij,sj->sk", v, matrices[violated], v) - self.margin * mu
             G, h = np.vstack([G, cuts]), np.concatenate([h, np.zeros(len(cuts))])
+            found = least_squares_above(A, y, G, h)
+            if found is None:
+                return None
+            x = found
         return x
 
     def _violation(self, matrices: Array, mu: Array, x: Array) -> Array:
@@ -95,7 +99,7 @@ class Limits:
 
     def _matrices(self, units: Sequence[Hyperelastic], norms: Array) -> Array:
         """Drucker's matrices of the unit moduli on the three paths, ``(samples, moduli, 2, 2)``."""
-        path = np.exp(np.log(self.largest_stretch) * np.linspace(0.0, 1.0, _SAMPLES) ** 1.5)
+        path = np.exp(np.log(self.largest_stretch) * np.linspace(0.0, 1.0, self.samples) ** 1.5)
         stretches = np.concatenate([principal_stretches(mode, path) for mode in MODES])
         with np.errstate(over="ignore", invalid="ignore"):
             columns = [drucker_matrix(unit, stretches) / norm for unit, norm in zip(units, norms, strict=True)]

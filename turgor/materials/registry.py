@@ -39,14 +39,18 @@ def models() -> dict[str, type[Hyperelastic]]:
     return found
 
 
-def find_model(name: str) -> type[Hyperelastic]:
+def find_model(name: str | type[Hyperelastic]) -> type[Hyperelastic]:
     """Return the model that is called `name`, has it among its aliases, or is written in the file `name` (``*.yaml``).
+
+    A model itself is returned as it is.
 
     Raises
     ------
     InputError
         If there is none; the message suggests near names.
     """
+    if isinstance(name, type):
+        return name
     if str(name).endswith((".yaml", ".yml")):
         return load_model(name)
     for model in models().values():
@@ -58,7 +62,7 @@ def find_model(name: str) -> type[Hyperelastic]:
 
 
 def create(
-    model: str,
+    model: str | type[Hyperelastic],
     constants: Mapping[str, object],
     *,
     bulk_modulus: object = None,
@@ -73,7 +77,7 @@ def create(
     Parameters
     ----------
     model
-        Printed name, such as ``"ogden-2"``.
+        Printed name, such as ``"ogden-2"``, the file of a user's model, or a class.
     constants
         Every constant of the model by name: text with its unit (``"0.07 MPa"``) or a float in the internal unit.
     bulk_modulus, D1, poisson
