@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.fem.section import Section, on_axis
 from turgor.fem.supports import Clamped, Prescribed, Sliding, face_normals
 from turgor.mesh.mesh import Mesh
 
@@ -29,11 +30,11 @@ class Constraints:
     Attributes
     ----------
     fixed
-        Which components are given, ``(n_points, 3)``, in the node's frame.
+        Which components are given, ``(n_points, d)``, in the node's frame.
     value
-        Their values at load fraction one, ``(n_points, 3)``, mm, in the node's frame.
+        Their values at load fraction one, ``(n_points, d)``, mm, in the node's frame.
     frame_nodes, frames
-        The nodes whose constrained directions are not the axes ``(k,)``, and their orthonormal frames ``(k, 3, 3)``:
+        The nodes whose constrained directions are not the axes ``(k,)``, and their orthonormal frames ``(k, d, d)``:
         one direction a row, the constrained ones first.
     """
 
@@ -43,11 +44,11 @@ class Constraints:
     frames: Floats
 
     def to_frames(self, vectors: Floats) -> Floats:
-        """Return nodal `vectors` ``(n_points, 3)`` with components in the nodes' frames."""
+        """Return nodal `vectors` ``(n_points, d)`` with components in the nodes' frames."""
         return self._turned(vectors, "kij,kj->ki")
 
     def from_frames(self, vectors: Floats) -> Floats:
-        """Return nodal `vectors` ``(n_points, 3)``, given in the nodes' frames, in x, y and z."""
+        """Return nodal `vectors` ``(n_points, d)``, given in the nodes' frames, in x, y and z."""
         return self._turned(vectors, "kji,kj->ki")
 
     def imposed(self, u: Floats, fraction: float) -> Floats:
@@ -68,20 +69,24 @@ class Constraints:
         return turned
 
 
-def compile_constraints(mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed]) -> Constraints:
-    """Turn supports into constraints on the nodes of `mesh`.
+def compile_constraints(
+    mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed], section: Section | None = None
+) -> Constraints:
+    """Turn supports into constraints on the nodes of `mesh`; those on an axis of revolution stay on it by themselves.
 
     Raises
     ------
     InputError
-        If two supports prescribe different displacements of one node in one direction.
+        If two supports prescribe different displacements of one node in one direction, or one leaves the plane.
     """
     rows: dict[int, list[tuple[Floats, float, str]]] = {}
     for support in supports:
         for node, direction, value in _conditions(mesh, support):
             rows.setdefault(node, []).append((direction, value, support.surface))
-    fixed = np.zeros((mesh.n_points, 3), bool)
-    values = np.zeros((mesh.n_points, 3))
+    for node in on_axis(mesh, section):
+        rows.setdefault(int(node), []).append((np.array([1.0, 0.0]), 0.0, "axis"))
+    fixed = np.zeros(mesh.points.shape, bool)
+    values = np.zeros(mesh.points.shape)
     nodes, frames = [], []
     for node, conditions in rows.items():
         basis, given = _independent(conditions, mesh.points[node])
@@ -94,18 +99,25 @@ def compile_constraints(mesh: Mesh, supports: Iterable[Clamped | Sliding | Presc
             values[node, : len(basis)] = given
             nodes.append(node)
             frames.append(_completed(basis))
-    return Constraints(fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, 3, 3))
+    return Constraints(
+        fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, mesh.dimension, mesh.dimension)
+    )
 
 
 def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[int, Floats, float]]:
-    axes = np.eye(3)
     if isinstance(support, Sliding):
         for node, normal in _node_normals(mesh.points, mesh.surface(support.surface)):
             yield node, normal, 0.0
         return
-    given = (0.0, 0.0, 0.0) if isinstance(support, Clamped) else support.displacement
+    d = mesh.dimension
+    given = (0.0,) * d if isinstance(support, Clamped) else support.displacement
+    if len(given) < d or any(given[d:]):
+        expected = f"{d} displacements" + (", none out of the plane" if d == 2 else "")
+        raise InputError(
+            "the displacement does not fit the model", key=f"supports.{support.surface}", value=given, expected=expected
+        )
     for node in mesh.surface_nodes(support.surface):
-        for axis, component in zip(axes, given, strict=True):
+        for axis, component in zip(np.eye(d), given[:d], strict=True):
             if component is not None:
                 yield int(node), axis, component
 
@@ -136,7 +148,7 @@ def _independent(conditions: list[tuple[Floats, float, str]], place: Floats) -> 
     given: list[float] = []
     for direction, wanted, surface in conditions:
         known = np.array([b @ direction for b in basis])
-        rest = direction - sum((c * b for c, b in zip(known, basis, strict=True)), np.zeros(3))
+        rest = direction - sum((c * b for c, b in zip(known, basis, strict=True)), np.zeros(len(direction)))
         left = wanted - float(known @ np.array(given)) if basis else wanted
         size = float(np.linalg.norm(rest))
         if size > SAME_DIRECTION:
@@ -145,7 +157,7 @@ def _independent(conditions: list[tuple[Floats, float, str]], place: Floats) -> 
         elif abs(left) > 1e-9 * max(1.0, abs(wanted)):
             raise InputError(
                 "two supports prescribe different displacements of the same node near "
-                f"({place[0]:.3g}, {place[1]:.3g}, {place[2]:.3g}) mm",
+                f"({', '.join(f'{x:.3g}' for x in place)}) mm",
                 key=f"supports.{surface}",
                 expected="supports that agree where their surfaces meet",
             )
@@ -153,6 +165,6 @@ def _independent(conditions: list[tuple[Floats, float, str]], place: Floats) -> 
 
 
 def _completed(basis: Floats) -> Floats:
-    """Add directions until `basis` ``(k, 3)`` is an orthonormal frame."""
+    """Add directions until `basis` ``(k, d)`` is an orthonormal frame."""
     _, _, rest = np.linalg.svd(basis)
     return np.vstack([basis, rest[len(basis) :]])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.elements import TET10
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.mesh.cells import Cell
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ def von_mises(system: System, state: State) -> VonMises:
     nodal = np.zeros(system.mesh.n_points)
     weight = np.zeros(system.mesh.n_points)
     points, volumes = [], []
-    extrapolate = _extrapolation()
+    extrapolate = _extrapolation(system.mesh.cell)
     for solid in system.solids:
         at_points = _von_mises(solid.cauchy_stress(state))
         at_nodes = np.maximum(at_points @ extrapolate.T, 0.0)
@@ -59,13 +60,20 @@ def _von_mises(stress: Floats) -> Floats:
     return np.asarray(np.sqrt(0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * shear))
 
 
-def _extrapolation() -> Floats:
-    """Return the matrix ``(10, 4)`` that continues a linear function from the quadrature points to the nodes."""
-    corners = np.vstack([np.zeros(3), np.eye(3)])
-    middles = [(corners[a] + corners[b]) / 2 for a, b in TET10.edges]
-    nodes = np.vstack([corners, *middles])
-    linear_at = np.column_stack([np.ones(4), TET10.points])
-    return np.asarray(np.column_stack([np.ones(10), nodes]) @ np.linalg.inv(linear_at))
+def _extrapolation(cell: Cell) -> Floats:
+    """Return the matrix ``(n, q)`` that continues the linear function fitted to the quadrature points to the nodes.
+
+    In quadrilaterals and hexahedra it is linear in each coordinate.
+    """
+    at_nodes, at_points = (_linear(places, cell.simplex) for places in (cell.nodes, cell.points))
+    return np.asarray(at_nodes @ np.linalg.pinv(at_points))
+
+
+def _linear(places: Floats, simplex: bool) -> Floats:
+    if simplex:
+        return np.column_stack([np.ones(len(places)), places])
+    powers = np.array(list(itertools.product((0, 1), repeat=places.shape[1])))
+    return np.asarray(np.prod(places[:, None, :] ** powers, axis=2))
 
 
 def _volume_percentile(values: Floats, volumes: Floats, part: float) -> float:

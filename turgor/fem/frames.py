@@ -27,7 +27,8 @@ class BlockFrames:
     """
 
     def __init__(self, constraints: Constraints, groups: Sequence[Ints]) -> None:
-        frames = np.broadcast_to(np.eye(3), (len(constraints.fixed), 3, 3))
+        d = constraints.fixed.shape[1]
+        frames = np.broadcast_to(np.eye(d), (len(constraints.fixed), d, d))
         framed = np.zeros(len(frames), bool)
         if len(constraints.frame_nodes):
             frames = frames.copy()
@@ -56,24 +57,25 @@ def unpack_symmetric(packed: Floats, size: int) -> Floats:
 
 
 def _block_diagonal(frames: Floats) -> Floats:
-    """Return ``(k, 3n, 3n)`` from the frames ``(k, n, 3, 3)`` of each block's nodes."""
-    k, n = frames.shape[:2]
-    turn = np.zeros((k, n, 3, n, 3))
+    """Return ``(k, n d, n d)`` from the frames ``(k, n, d, d)`` of each block's nodes."""
+    k, n, d = frames.shape[:3]
+    turn = np.zeros((k, n, d, n, d))
     at = np.arange(n)
     turn[:, at, :, at, :] = frames.transpose(1, 0, 2, 3)
-    return turn.reshape(k, 3 * n, 3 * n)
+    return turn.reshape(k, n * d, n * d)
 
 
 @nb.njit(cache=True)
 def block_products(nodes, packed, field, out):  # type: ignore[no-untyped-def]
-    """Add the products of packed symmetric blocks with a nodal ``field (n_points, 3)`` to ``out (n_points, 3)``."""
-    n = 3 * nodes.shape[1]
+    """Add the products of packed symmetric blocks with a nodal ``field (n_points, d)`` to ``out (n_points, d)``."""
+    d = field.shape[1]
+    n = d * nodes.shape[1]
     for block in range(len(nodes)):
         at = 0
         for row in range(n):
-            a, i = nodes[block, row // 3], row % 3
+            a, i = nodes[block, row // d], row % d
             for col in range(row, n):
-                b, k = nodes[block, col // 3], col % 3
+                b, k = nodes[block, col // d], col % d
                 value = packed[block, at]
                 out[a, i] += value * field[b, k]
                 if col != row:

@@ -12,16 +12,19 @@ from scipy.sparse.csgraph import connected_components
 from turgor.common.errors import InputError
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import Constraints
+from turgor.fem.section import Axisymmetric, Section
 from turgor.fem.supports import ElasticSupport, face_normals
+from turgor.mesh.cells import face_cell
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 
-MOTIONS = ("shift along x", "shift along y", "shift along z", "turn about x", "turn about y", "turn about z")
 NEGLIGIBLE = 1e-8
 
 
-def check_held(mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport]) -> None:
+def check_held(
+    mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport], section: Section | None = None
+) -> None:
     """Refuse a body, or a part of one, that can move as a whole without meeting a support.
 
     Raises
@@ -36,8 +39,7 @@ def check_held(mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSu
         here = part[nodes] == k
         centre = mesh.points[part == k].mean(axis=0)
         arm = (mesh.points[nodes[here]] - centre) / size
-        rows = np.hstack([directions[here], np.cross(arm, directions[here])])
-        free = _free_motion(rows)
+        free = _free_motion(*_work(arm, directions[here], section))
         if free is not None:
             what = (
                 "the body" if count == 1 else f"part {k + 1} of {count} of the body, which is not joined to the rest,"
@@ -75,8 +77,9 @@ def _node_graph(mesh: Mesh) -> sp.csr_matrix:
 def _held_directions(
     mesh: Mesh, constraints: Constraints, springs: Iterable[ElasticSupport]
 ) -> tuple[NDArray[np.integer], Floats]:
-    """Return the nodes ``(k,)`` and unit directions ``(k, 3)`` along which something holds them."""
-    frames = np.broadcast_to(np.eye(3), (mesh.n_points, 3, 3)).copy()
+    """Return the nodes ``(k,)`` and unit directions ``(k, d)`` along which something holds them."""
+    d = mesh.dimension
+    frames = np.broadcast_to(np.eye(d), (mesh.n_points, d, d)).copy()
     frames[constraints.frame_nodes] = constraints.frames
     node, component = np.nonzero(constraints.fixed)
     nodes: list[NDArray[np.integer]] = [node]
@@ -86,18 +89,34 @@ def _held_directions(
         if support.normal_only:
             normal = face_normals(mesh.points, faces).sum(axis=1)
             unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-            nodes.append(faces[:, :3].ravel())
-            directions.append(np.repeat(unit, 3, axis=0))
+            corners = faces[:, : face_cell(faces).n_corners]
+            nodes.append(corners.ravel())
+            directions.append(np.repeat(unit, corners.shape[1], axis=0))
         else:
             corners = np.unique(faces)
-            nodes.append(np.repeat(corners, 3))
-            directions.append(np.tile(np.eye(3), (len(corners), 1)))
+            nodes.append(np.repeat(corners, d))
+            directions.append(np.tile(np.eye(d), (len(corners), 1)))
     return np.concatenate(nodes), np.concatenate(directions)
 
 
-def _free_motion(rows: Floats) -> str | None:
-    """Return the name of the rigid motion that the held directions ``(k, 6)`` do not stop, if there is one."""
-    values, motions = np.linalg.eigh(rows.T @ rows)
+def _work(arm: Floats, directions: Floats, section: Section | None) -> tuple[Floats, tuple[str, ...]]:
+    """Return how far each rigid motion moves each place along its held direction ``(k, n_motions)``, and their names.
+
+    `arm` and `directions` are ``(k, d)``. A body of revolution can only shift along its axis.
+    """
+    shifts = ("shift along x", "shift along y", "shift along z")
+    if isinstance(section, Axisymmetric):
+        return directions[:, 1:], shifts[1:2]
+    if section is not None:
+        turn = arm[:, 0] * directions[:, 1] - arm[:, 1] * directions[:, 0]
+        return np.column_stack([directions, turn]), (*shifts[:2], "turn about z")
+    turns = ("turn about x", "turn about y", "turn about z")
+    return np.hstack([directions, np.cross(arm, directions)]), (*shifts, *turns)
+
+
+def _free_motion(rows: Floats, motions: tuple[str, ...]) -> str | None:
+    """Return the name of the rigid motion that the held directions do not stop, if there is one."""
+    values, modes = np.linalg.eigh(rows.T @ rows)
     if len(rows) and values[0] > NEGLIGIBLE * values[-1]:
         return None
-    return MOTIONS[int(np.argmax(np.abs(motions[:, 0])))]
+    return motions[int(np.argmax(np.abs(modes[:, 0])))]

@@ -1,9 +1,14 @@
 """Element kernels of the solid: plain functions on plain arrays, compiled and run in parallel over elements.
 
-Shapes: ``m`` elements, ``q`` quadrature points, ``n`` nodes per element, three components. Symmetric tensors are
-stored in the order 00, 11, 22, 01, 12, 02; a fourth-order tensor with both symmetries as the packed upper triangle
-(21 entries) of its 6 × 6 matrix in that order. Reference gradients are kept as ``(m, q, 3, n)`` so that the
-innermost loops run over nodes that lie side by side in memory.
+Shapes: ``m`` elements, ``q`` quadrature points, ``n`` nodes per element, ``d`` displacement components (3, or 2 in
+plane models), ``k`` pressure modes. Symmetric tensors are stored in the order 00, 11, 22, 01, 12, 02; a fourth-order
+tensor with both symmetries as the packed upper triangle (21 entries) of its 6 × 6 matrix in that order. Reference
+gradients are kept as ``(m, q, 3, n)`` so that the innermost loops run over nodes that lie side by side in memory.
+
+One set of kernels serves space, plane strain, plane stress and bodies of revolution, because the deformation gradient
+is 3 × 3 in all of them: displacement component i reaches it through row s of the gradients at the place
+(``ROW[d-2, i, s]``, ``COL[d-2, i, s]``), which in space is simply (i, s). In a plane model row 2 holds the
+gradient across the plane (:func:`turgor.fem.elements.reference_gradients`), which only component 0 has, at (2, 2).
 
 Which part of the work is whose: :mod:`turgor.fem.constitutive` turns deformation gradients into Kirchhoff stress and
 spatial tangent, point by point; this file knows nothing of materials.
@@ -11,8 +16,11 @@ spatial tangent, point by point; this file knows nothing of materials.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numba as nb
 import numpy as np
+from numpy.typing import NDArray
 
 # No NaN or infinity is assumed away: the solver tests for both.
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
@@ -26,6 +34,30 @@ inlined = nb.njit(cache=True, fastmath=FASTMATH, error_model="numpy", inline="al
 # Place of component (i, j) of a symmetric tensor, and of entry (r, s) of a packed symmetric 6 × 6 matrix.
 SYM = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 PACK = np.array([[min(r, s) * 6 - min(r, s) * (min(r, s) + 1) // 2 + max(r, s) for s in range(6)] for r in range(6)])
+
+NOWHERE = -1
+# Where component i reaches the deformation gradient through row s, for plane models and for space.
+ROW = np.array([[[0, 0, 2], [1, 1, NOWHERE], [NOWHERE] * 3], [[0] * 3, [1] * 3, [2] * 3]])
+COL = np.array([[[0, 1, 2], [0, 1, NOWHERE], [NOWHERE] * 3], [[0, 1, 2]] * 3])
+# The same for a symmetric tensor in stored order.
+STRESS = np.where(ROW == NOWHERE, NOWHERE, SYM[ROW, COL])
+
+
+def _pairs(entry: Callable[[int, int, int, int], int]) -> NDArray[np.int64]:
+    """Tabulate ``entry(i, j, k, m)`` of the tensor components that the pairs (component, row) stand for."""
+    table = np.full((2, 3, 3, 3, 3), NOWHERE, dtype=np.int64)
+    for case, i, s, k, t in np.ndindex(table.shape):
+        one, other = (int(ROW[case, i, s]), int(COL[case, i, s])), (int(ROW[case, k, t]), int(COL[case, k, t]))
+        if NOWHERE not in one and NOWHERE not in other:
+            table[case, i, s, k, t] = entry(*one, *other)
+    return table
+
+
+# Of each pair of such places: the entry of the packed tangent, that of the stress where the tensor's rows agree, and
+# the coefficient of a pressure.
+TANGENT = _pairs(lambda i, j, k, m: PACK[SYM[i, j], SYM[k, m]])
+GEOMETRIC = _pairs(lambda i, j, k, m: SYM[j, m] if i == k else NOWHERE)
+ON_PRESSURE = _pairs(lambda i, j, k, m: int(i == j and k == m) - int(i == m and j == k)).astype(float)
 
 
 @inlined
@@ -48,55 +80,80 @@ def inverse(F, out):  # type: ignore[no-untyped-def]
     return determinant
 
 
-@parallel
-def reference_gradients(points, cells, local_gradient, weights, G, dV):  # type: ignore[no-untyped-def]
-    """Fill the gradients ``G (m, q, 3, n)`` of the shape functions and the volumes ``dV (m, q)``.
+@inlined
+def gather(field, nodes, out):  # type: ignore[no-untyped-def]
+    """Write the values of a nodal ``field (n_points, d)`` at the `nodes` ``(n,)`` into ``out (d, n)``."""
+    for a in range(len(nodes)):
+        for i in range(out.shape[0]):
+            out[i, a] = field[nodes[a], i]
 
-    `local_gradient` is ``(q, n, 3)``, with respect to the reference coordinates of the element.
+
+@inlined
+def displacement_gradient(u, G, H):  # type: ignore[no-untyped-def]
+    """Write ∂u/∂X into ``H (3, 3)`` from the nodal displacements ``u (d, n)`` and gradients ``G (3, n)``."""
+    case = u.shape[0] - 2
+    H[:] = 0.0
+    for i in range(u.shape[0]):
+        for s in range(3):
+            if ROW[case, i, s] != NOWHERE:
+                value = 0.0
+                for a in range(G.shape[1]):
+                    value += u[i, a] * G[s, a]
+                H[ROW[case, i, s], COL[case, i, s]] = value
+
+
+@parallel
+def deformation(u, cells, G, dV, modes, F, J, dilatation):  # type: ignore[no-untyped-def]
+    """Fill ``F (m, q, 3, 3)``, its determinant ``J (m, q)`` and its projection on the pressure modes.
+
+    ``dilatation (m, k)`` are the coefficients ``∫ ψ_k J dV / V``; the first one is the element's ratio of volumes.
     """
-    n_nodes = cells.shape[1]
-    for e in nb.prange(len(cells)):
-        jacobian = np.empty((3, 3))
+    for chunk in nb.prange(CHUNKS):
+        local = np.empty((u.shape[1], cells.shape[1]))
+        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
+            gather(u, cells[e], local)
+            dilatation[e] = 0.0
+            volume = 0.0
+            for q in range(G.shape[1]):
+                f = F[e, q]
+                displacement_gradient(local, G[e, q], f)
+                for i in range(3):
+                    f[i, i] += 1.0
+                J[e, q] = (
+                    f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
+                    + f[0, 1] * (f[1, 2] * f[2, 0] - f[1, 0] * f[2, 2])
+                    + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
+                )
+                volume += dV[e, q]
+                for k in range(modes.shape[2]):
+                    dilatation[e, k] += modes[e, q, k] * J[e, q] * dV[e, q]
+            for k in range(modes.shape[2]):
+                dilatation[e, k] /= volume
+
+
+@parallel
+def dilatation_changes(du, cells, F, G, dV, modes, change):  # type: ignore[no-untyped-def]
+    """Fill ``change (m, k)``, the derivative of the dilatations of :func:`deformation` along `du` ``(n_points, d)``."""
+    for chunk in nb.prange(CHUNKS):
+        local = np.empty((du.shape[1], cells.shape[1]))
+        H = np.empty((3, 3))
         inv = np.empty((3, 3))
-        for q in range(len(weights)):
-            jacobian[:] = 0.0
-            for a in range(n_nodes):
+        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
+            gather(du, cells[e], local)
+            change[e] = 0.0
+            volume = 0.0
+            for q in range(G.shape[1]):
+                displacement_gradient(local, G[e, q], H)
+                weight = inverse(F[e, q], inv) * dV[e, q]
+                trace = 0.0
                 for i in range(3):
                     for j in range(3):
-                        jacobian[i, j] += points[cells[e, a], i] * local_gradient[q, a, j]
-            dV[e, q] = inverse(jacobian, inv) * weights[q]
-            for a in range(n_nodes):
-                for i in range(3):
-                    G[e, q, i, a] = (
-                        local_gradient[q, a, 0] * inv[0, i]
-                        + local_gradient[q, a, 1] * inv[1, i]
-                        + local_gradient[q, a, 2] * inv[2, i]
-                    )
-
-
-@parallel
-def deformation(u, cells, G, dV, F, J, dilatation):  # type: ignore[no-untyped-def]
-    """Fill ``F (m, q, 3, 3)``, its determinant ``J (m, q)`` and each element's mean dilatation v/V ``(m,)``."""
-    n_nodes = cells.shape[1]
-    for e in nb.prange(len(cells)):
-        volume = 0.0
-        deformed = 0.0
-        for q in range(G.shape[1]):
-            f = F[e, q]
-            for i in range(3):
-                for j in range(3):
-                    value = 1.0 if i == j else 0.0
-                    for a in range(n_nodes):
-                        value += u[cells[e, a], i] * G[e, q, j, a]
-                    f[i, j] = value
-            J[e, q] = (
-                f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
-                + f[0, 1] * (f[1, 2] * f[2, 0] - f[1, 0] * f[2, 2])
-                + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
-            )
-            volume += dV[e, q]
-            deformed += J[e, q] * dV[e, q]
-        dilatation[e] = deformed / volume
+                        trace += inv[j, i] * H[i, j]
+                volume += dV[e, q]
+                for k in range(modes.shape[2]):
+                    change[e, k] += modes[e, q, k] * weight * trace
+            for k in range(modes.shape[2]):
+                change[e, k] /= volume
 
 
 @inlined
@@ -111,123 +168,143 @@ def spatial_gradients(F, G, inv, g):  # type: ignore[no-untyped-def]
 
 @parallel
 def element_forces(F, G, dV, tau, pressure, force):  # type: ignore[no-untyped-def]
-    """Fill the internal forces ``force (m, n, 3)`` from the isochoric Kirchhoff stress and the mean pressure.
+    """Fill the internal forces ``force (m, n, d)`` from the isochoric Kirchhoff stress and the pressure.
 
-    ``f_a = ∫ (tau + p J 1) g_a dV`` with ``tau (m, q, 6)`` and ``pressure (m,)``.
+    ``f_a = ∫ (tau + p J 1) g_a dV`` with ``tau (m, q, 6)`` and ``pressure (m, q)``.
     """
-    n_nodes = G.shape[3]
+    n_nodes, d = force.shape[1], force.shape[2]
     for chunk in nb.prange(CHUNKS):
         inv = np.empty((3, 3))
         g = np.empty((3, n_nodes))
+        total = np.empty((d, n_nodes))
+        t = np.zeros(3)
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
-            force[e] = 0.0
+            total[:] = 0.0
             for q in range(G.shape[1]):
-                J = spatial_gradients(F[e, q], G[e, q], inv, g)
-                t = tau[e, q]
-                w = dV[e, q]
-                p = pressure[e] * J
-                for a in range(n_nodes):
-                    force[e, a, 0] += w * ((t[0] + p) * g[0, a] + t[3] * g[1, a] + t[5] * g[2, a])
-                    force[e, a, 1] += w * (t[3] * g[0, a] + (t[1] + p) * g[1, a] + t[4] * g[2, a])
-                    force[e, a, 2] += w * (t[5] * g[0, a] + t[4] * g[1, a] + (t[2] + p) * g[2, a])
-
-
-@parallel
-def volume_gradients(F, G, dV, gradient):  # type: ignore[no-untyped-def]
-    """Fill ``gradient (m, n, 3)``, the derivative of each element's deformed volume with respect to its nodes."""
-    n_nodes = G.shape[3]
-    for chunk in nb.prange(CHUNKS):
-        inv = np.empty((3, 3))
-        g = np.empty((3, n_nodes))
-        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
-            gradient[e] = 0.0
-            for q in range(G.shape[1]):
-                weight = spatial_gradients(F[e, q], G[e, q], inv, g) * dV[e, q]
-                for a in range(n_nodes):
-                    for i in range(3):
-                        gradient[e, a, i] += weight * g[i, a]
+                p = spatial_gradients(F[e, q], G[e, q], inv, g) * pressure[e, q]
+                for i in range(d):
+                    for s in range(3):
+                        at = STRESS[d - 2, i, s]
+                        t[s] = 0.0 if at == NOWHERE else dV[e, q] * (tau[e, q, at] + (p if at < 3 else 0.0))
+                    for a in range(n_nodes):
+                        total[i, a] += t[0] * g[0, a] + t[1] * g[1, a] + t[2] * g[2, a]
+            for a in range(n_nodes):
+                for i in range(d):
+                    force[e, a, i] = total[i, a]
 
 
 @inlined
 def elasticity(tau, tangent, pressure_J, weight, A):  # type: ignore[no-untyped-def]
-    """Fill ``A (3, 3, 3, 3)``: weight · (c_ijkl + tau_jl δ_ik), the pressure's part included.
+    """Fill ``A (d, 3, d, 3)``, blocks on and above the diagonal: weight · (c_ijkm + tau_jm δ_ik), pressure included.
 
     A pressure p adds p J (1⊗1 − 2 I) to the spatial tangent and p J 1 to the Kirchhoff stress (Bonet and Wood 2008,
-    eq. 6.55).
+    eq. 6.55), in all p J (δ_ij δ_km − δ_im δ_jk).
     """
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                for m in range(3):
-                    value = tangent[PACK[SYM[i, j], SYM[k, m]]]
-                    if i == j and k == m:
-                        value += pressure_J
-                    if i == m and j == k:
-                        value -= pressure_J
-                    if i == k:
-                        value += tau[SYM[j, m]]
-                        # + p J δ_ik δ_jl of the stress and − p J δ_ik δ_jl of the tangent cancel.
-                    A[i, j, k, m] = weight * value
-
-
-@parallel
-def element_stiffness(F, G, dV, tau, tangent, pressure, bulk, packed):  # type: ignore[no-untyped-def]
-    """Fill the packed upper triangles ``packed (m, 3n(3n+1)/2)`` of the element stiffness matrices.
-
-    ``K_ab = ∫ g_a · (c + τ) · g_b dV + (U''/V) b_a b_b`` with the element's mean pressure condensed (Simo, Taylor and
-    Pister 1985), ``b`` the gradient of its deformed volume. `pressure` ``(m,)`` is the one that the
-    geometric part uses, and `bulk` ``(m,)`` is U'' at the element's dilatation.
-
-    Rows and columns run component by component inside (columns of one component lie side by side, so that the
-    loops over them vectorise); node by node in the packed result.
-    """
-    n_nodes = G.shape[3]
-    n_dofs = 3 * n_nodes
-    for chunk in nb.prange(CHUNKS):
-        inv = np.empty((3, 3))
-        g = np.empty((3, n_nodes))
-        A = np.empty((3, 3, 3, 3))
-        half = np.empty((3, 3, n_dofs))
-        K = np.empty((n_dofs, n_dofs))
-        b = np.empty(n_dofs)
-        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
-            K[:] = 0.0
-            b[:] = 0.0
-            volume = 0.0
-            for q in range(G.shape[1]):
-                J = spatial_gradients(F[e, q], G[e, q], inv, g)
-                elasticity(tau[e, q], tangent[e, q], pressure[e] * J, dV[e, q], A)
-                volume += dV[e, q]
-                for i in range(3):
-                    for a in range(n_nodes):
-                        b[i * n_nodes + a] += J * dV[e, q] * g[i, a]
-                    for j in range(3):
-                        for k in range(3):
-                            for a in range(n_nodes):
-                                half[i, j, k * n_nodes + a] = (
-                                    A[i, j, k, 0] * g[0, a] + A[i, j, k, 1] * g[1, a] + A[i, j, k, 2] * g[2, a]
-                                )
-                for i in range(3):
-                    for a in range(n_nodes):
-                        g0, g1, g2 = g[0, a], g[1, a], g[2, a]
-                        row = K[i * n_nodes + a]
-                        for c in range(n_dofs):
-                            row[c] += g0 * half[i, 0, c] + g1 * half[i, 1, c] + g2 * half[i, 2, c]
-            pack(K, b, bulk[e] / volume, n_nodes, packed[e])
+    d = A.shape[0]
+    for i in range(d):
+        for k in range(i, d):
+            for s in range(3):
+                for t in range(3):
+                    at = TANGENT[d - 2, i, s, k, t]
+                    if at == NOWHERE:
+                        A[i, s, k, t] = 0.0
+                        continue
+                    value = tangent[at] + pressure_J * ON_PRESSURE[d - 2, i, s, k, t]
+                    if GEOMETRIC[d - 2, i, s, k, t] != NOWHERE:
+                        value += tau[GEOMETRIC[d - 2, i, s, k, t]]
+                    A[i, s, k, t] = weight * value
 
 
 @inlined
-def pack(K, b, scale, n_nodes, out):  # type: ignore[no-untyped-def]
-    """Write the upper triangle of ``K + scale b bᵀ``, reordered from component by component to node by node."""
-    at = 0
-    for a in range(n_nodes):
-        for i in range(3):
-            row = i * n_nodes + a
-            scaled = scale * b[row]
-            for k in range(i, 3):
-                out[at] = K[row, k * n_nodes + a] + scaled * b[k * n_nodes + a]
-                at += 1
-            for c in range(a + 1, n_nodes):
-                for k in range(3):
-                    out[at] = K[row, k * n_nodes + c] + scaled * b[k * n_nodes + c]
-                    at += 1
+def add_products(A, g, half, K):  # type: ignore[no-untyped-def]
+    """Add ``g · A · g`` to the blocks on and above the diagonal of a stiffness matrix, stored as ``K (d, n, d n)``.
+
+    ``K[i, a]`` is the row of component i of node a from the diagonal block on: ``K[i, a, (k - i) n + b]`` couples it to
+    component k of node b. The columns of one component lie side by side, so that the loop over them vectorises.
+    """
+    d, n_nodes = K.shape[0], K.shape[1]
+    for i in range(d):
+        for s in range(3):
+            for k in range(d - i):
+                a0, a1, a2 = A[i, s, i + k, 0], A[i, s, i + k, 1], A[i, s, i + k, 2]
+                part = half[s, k * n_nodes : (k + 1) * n_nodes]
+                for a in range(n_nodes):
+                    part[a] = a0 * g[0, a] + a1 * g[1, a] + a2 * g[2, a]
+        for a in range(n_nodes):
+            g0, g1, g2 = g[0, a], g[1, a], g[2, a]
+            row = K[i, a]
+            for c in range((d - i) * n_nodes):
+                row[c] += g0 * half[0, c] + g1 * half[1, c] + g2 * half[2, c]
+
+
+@inlined
+def add_volume_gradients(weight, g, modes, b):  # type: ignore[no-untyped-def]
+    """Add ``weight · ψ_k · (∂J/∂u)/J`` to ``b (k, d, n)``."""
+    d = b.shape[1]
+    for k in range(len(modes)):
+        scale = weight * modes[k]
+        for i in range(d):
+            for a in range(g.shape[1]):
+                b[k, i, a] += scale * g[i, a]
+        if d == 2:
+            for a in range(g.shape[1]):
+                b[k, 0, a] += scale * g[2, a]
+
+
+@inlined
+def add_condensed(bulk, b, K):  # type: ignore[no-untyped-def]
+    """Add ``Σ_kl bulk_kl b_k b_lᵀ`` to `K`, stored as in :func:`add_products`; `b` is ``(k, d n)``."""
+    n_nodes = K.shape[1]
+    for i in range(K.shape[0]):
+        for m in range(len(bulk)):
+            right = b[m, i * n_nodes :]
+            for a in range(n_nodes):
+                scale = 0.0
+                for k in range(len(bulk)):
+                    scale += bulk[k, m] * b[k, i * n_nodes + a]
+                row = K[i, a]
+                for c in range(len(right)):
+                    row[c] += scale * right[c]
+
+
+def packing(n_nodes: int, d: int) -> NDArray[np.uintp]:
+    """Return where in the flat `K` of :func:`add_products` each entry of its packed upper triangle stands.
+
+    There rows and columns run node by node: those of node 0, then those of node 1, and so on.
+    """
+    row, col = np.triu_indices(d * n_nodes)
+    # The entry and its mirror image are equal; stored is the one whose row belongs to the lower component.
+    swap = col % d < row % d
+    row, col = np.where(swap, col, row), np.where(swap, row, col)
+    (a, i), (b, k) = divmod(row, d), divmod(col, d)
+    return ((i * n_nodes + a) * d * n_nodes + (k - i) * n_nodes + b).astype(np.uintp)
+
+
+@parallel
+def element_stiffness(F, G, dV, tau, tangent, pressure, modes, bulk, d, places, packed):  # type: ignore[no-untyped-def]
+    """Fill the packed upper triangles ``packed (m, d n (d n + 1)/2)`` of the element stiffness matrices.
+
+    ``K_ab = ∫ g_a · (c + τ) · g_b dV + Σ_kl D_kl b_k b_l`` with the element's pressure condensed (Simo, Taylor and
+    Pister 1985), ``b_k = ∫ ψ_k ∂J/∂u dV``. `pressure` ``(m, q)`` is the one that the geometric part uses, `bulk`
+    ``(m, k, k)`` is D, ``∫ ψ_k U'' ψ_l dV / V²``, and `places` is :func:`packing`.
+    """
+    n_nodes = G.shape[3]
+    for chunk in nb.prange(CHUNKS):
+        inv = np.empty((3, 3))
+        g = np.empty((3, n_nodes))
+        A = np.empty((d, 3, d, 3))
+        half = np.empty((3, d * n_nodes))
+        K = np.empty((d, n_nodes, d * n_nodes))
+        b = np.empty((modes.shape[2], d, n_nodes))
+        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
+            K[:] = 0.0
+            b[:] = 0.0
+            for q in range(G.shape[1]):
+                J = spatial_gradients(F[e, q], G[e, q], inv, g)
+                elasticity(tau[e, q], tangent[e, q], pressure[e, q] * J, dV[e, q], A)
+                add_products(A, g, half, K)
+                add_volume_gradients(J * dV[e, q], g, modes[e, q], b)
+            add_condensed(bulk[e], b.reshape(modes.shape[2], d * n_nodes), K)
+            flat = K.ravel()
+            for at in range(len(places)):
+                packed[e, at] = flat[places[at]]

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.elements import TET10, TRI6
+from turgor.fem.section import Section, surface_areas
 from turgor.fem.state import State
-from turgor.fem.supports import face_normals
 from turgor.fem.term import NO_NODES, Unlagged
+from turgor.mesh.cells import body_cell, face_cell
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Vector = tuple[float, float, float]
+Vector = tuple[float, ...]
+"""Components along x, y and z; in a plane model two are enough."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class DeadLoad(Unlagged):
     Parameters
     ----------
     nodal
-        The forces at factor one, ``(n_points, 3)``, N.
+        The forces at factor one, ``(n_points, d)``, N.
     channel
         Place of the factor in ``State.loads``.
     """
@@ -89,20 +90,20 @@ class DeadLoad(Unlagged):
         """Fill nothing: a dead load has no stiffness."""
 
 
-def body_force(cells: Ints, dV: Floats, density: float, acceleration: Vector, out: Floats) -> None:
-    """Add the nodal forces ``∫ ρ g N dV`` of ten-node tetrahedra ``(m, 10)`` to ``out (n_points, 3)``.
+def body_force(cells: Ints, dV: Floats, density: float, acceleration: Floats, out: Floats) -> None:
+    """Add the nodal forces ``∫ ρ g N dV`` of `cells` ``(m, n)`` to ``out (n_points, d)``.
 
     `dV` ``(m, q)`` are the volumes at the quadrature points and `density` is in t/mm³.
     """
-    share = dV @ TET10.shape_at_quadrature
+    share = dV @ body_cell(cells).shape_at_quadrature
     mass = density * np.bincount(cells.ravel(), share.ravel(), minlength=len(out))
-    out += mass[:, None] * np.asarray(acceleration)
+    out += mass[:, None] * acceleration
 
 
-def surface_force(points: Floats, faces: Ints, traction: Vector, out: Floats) -> float:
-    """Add the nodal forces ``∫ t N dA`` of a dead traction to ``out (n_points, 3)`` and return the area, mm²."""
-    area = np.linalg.norm(face_normals(points, faces), axis=2) * TRI6.weights
-    share = area @ TRI6.shape_at_quadrature
+def surface_force(points: Floats, faces: Ints, traction: Floats, section: Section | None, out: Floats) -> float:
+    """Add the nodal forces ``∫ t N dA`` of a dead traction to ``out (n_points, d)`` and return the area, mm²."""
+    _, area = surface_areas(points, faces, section)
+    share = area @ face_cell(faces).shape_at_quadrature
     lumped = np.bincount(faces.ravel(), share.ravel(), minlength=len(out))
-    out += lumped[:, None] * np.asarray(traction)
+    out += lumped[:, None] * traction
     return float(area.sum())

@@ -1,4 +1,4 @@
-"""The elastic body: curved ten-node tetrahedra with one mean pressure each."""
+"""The elastic body: curved second-order elements whose pressure is one degree lower than their strain."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem import constitutive, kernels
-from turgor.fem.elements import TET10
-from turgor.fem.pattern import packed_size
+from turgor.fem.elements import pressure_modes, reference_gradients
+from turgor.fem.section import Section
 from turgor.fem.state import State
 from turgor.fem.term import add_at_nodes
 from turgor.materials.hyperelastic import Hyperelastic, InvariantModel, StretchModel
+from turgor.mesh.cells import body_cell
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -19,43 +20,62 @@ TANGENT_SIZE = 21
 
 
 class Solid:
-    """∫ W(F̄) dV + Σ_e U(θ_e) V_e over one material region, θ_e the element's ratio of volumes.
+    """∫ W(F̄) + U(θ) dV over one material region, θ the projection of J on the pressure modes of each element.
 
-    The mean dilatation (Nagtegaal, Parks and Rice 1974; Simo, Taylor and Pister 1985) makes the ten-node
-    tetrahedron free of volumetric locking. The dilatations are what lags (:class:`turgor.fem.term.Term`): the
-    geometric stiffness uses the pressure U'(θ) of the lagged ones, so that the iteration sees the volume
-    constraint as linear and converges in long steps at any bulk modulus.
+    In tetrahedra and triangles θ is the element's ratio of volumes (Nagtegaal, Parks and Rice 1974), in hexahedra and
+    quadrilaterals it is linear (Simo, Taylor and Pister 1985): this frees the elements of volumetric locking. The
+    coefficients of θ are what lags (:class:`turgor.fem.term.Term`): the geometric stiffness uses the pressure U'(θ) of
+    the lagged ones, so that the iteration sees the volume constraint as linear and converges in long steps at any bulk
+    modulus.
 
     Parameters
     ----------
     points, cells
-        The mesh: ``(n_points, 3)`` and the region's tetrahedra ``(m, 10)``.
+        The mesh: ``(n_points, d)`` and the region's cells ``(m, n)``.
     index
-        Places of these tetrahedra among all cells of the mesh, ``(m,)``.
+        Places of these cells among all cells of the mesh, ``(m,)``.
     material
         The hyperelastic law of the region.
+    section
+        What a plane mesh stands for.
     """
 
-    def __init__(self, points: Floats, cells: Ints, index: NDArray[np.intp], material: Hyperelastic) -> None:
+    def __init__(
+        self,
+        points: Floats,
+        cells: Ints,
+        index: NDArray[np.intp],
+        material: Hyperelastic,
+        section: Section | None = None,
+    ) -> None:
         self.nodes = np.ascontiguousarray(cells, dtype=np.int32)
         self.index = index
         self.material = material
-        m, q, n = len(cells), len(TET10.weights), cells.shape[1]
-        self.G = np.empty((m, q, 3, n))
-        self.dV = np.empty((m, q))
-        kernels.reference_gradients(points, self.nodes, TET10.gradient_at_quadrature, TET10.weights, self.G, self.dV)
+        self.cell = body_cell(self.nodes)
+        self.G, self.dV = reference_gradients(points[self.nodes], self.cell, section)
         self.volume = self.dV.sum(axis=1)
+        self.modes = self._modes(points[self.nodes])
+        self._share = self.modes * (self.dV / self.volume[:, None])[:, :, None]
+        m, q, _, n = self.G.shape
         self._F = np.empty((m, q, 3, 3))
         self._J = np.empty((m, q))
-        self._dilatation = np.empty(m)
+        self._dilatation = np.empty((m, self.modes.shape[2]))
         self._tau = np.empty((m, q, 6))
         self._tangent = np.empty((m, q, TANGENT_SIZE))
-        self._force = np.empty((m, n, 3))
+        self._force = np.empty((m, n, self.cell.dimension))
+        self._places = kernels.packing(n, self.cell.dimension)
 
     def lagged_at(self, u: Floats) -> Floats:
-        """Return each element's ratio of deformed to reference volume at displacement `u`, ``(m,)``."""
+        """Return the coefficients of θ at displacement `u`, ``(m, k)``; the first is the element's ratio of volumes."""
         self._deform(u)
         return self._dilatation.copy()
+
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return the coefficients of θ ``(m, k)`` that the step `du` ``(n_points, d)`` predicts, linearised."""
+        self._deform(state.u)
+        change = np.empty_like(self._dilatation)
+        kernels.dilatation_changes(du, self.nodes, self._F, self.G, self.dV, self.modes, change)
+        return self._dilatation + change
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F over the quadrature points and the mesh cell where it is."""
@@ -67,14 +87,14 @@ class Solid:
         """Return the strain energy, N mm."""
         self._deform(state.u)
         density = self._law()[0].reshape(self.dV.shape)
-        volumetric = self.material.volumetric.energy(self._dilatation)
-        return float(np.sum(density * self.dV) + np.sum(volumetric * self.volume))
+        volumetric = self.material.volumetric.energy(self._at_points(self._dilatation))
+        return float(np.sum((density + volumetric) * self.dV))
 
     def force(self, state: State, out: Floats) -> None:
         """Add the internal forces, N."""
         self._deform(state.u)
         self._respond()
-        pressure = self.material.volumetric.pressure(self._dilatation)
+        pressure = self._pressure(self._dilatation)
         kernels.element_forces(self._F, self.G, self.dV, self._tau, pressure, self._force)
         add_at_nodes(self.nodes, self._force, out)
 
@@ -82,29 +102,59 @@ class Solid:
         """Fill the element stiffnesses, the pressure condensed."""
         self._deform(state.u)
         self._respond()
-        pressure = self.material.volumetric.pressure(lagged)
-        bulk = self.material.volumetric.stiffness(lagged)
-        assert out.shape[1] == packed_size(3 * self.nodes.shape[1])
-        kernels.element_stiffness(self._F, self.G, self.dV, self._tau, self._tangent, pressure, bulk, out)
+        kernels.element_stiffness(
+            self._F,
+            self.G,
+            self.dV,
+            self._tau,
+            self._tangent,
+            self._pressure(lagged),
+            self.modes,
+            self._bulk(lagged),
+            self.cell.dimension,
+            self._places,
+            out,
+        )
 
-    def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the dilatations that the step `du` (n_points, 3) predicts, linearised at the state, ``(m,)``."""
-        self._deform(state.u)
-        kernels.volume_gradients(self._F, self.G, self.dV, self._force)
-        change = np.einsum("ean,ean->e", self._force, du[self.nodes])
-        return np.asarray(self._dilatation + change / self.volume)
+    def dilatation(self, state: State, lagged: Floats) -> Floats:
+        """Return each element's mean lagged dilatation, at an equilibrium its ratio of volumes, ``(m,)``."""
+        del state
+        return lagged[:, 0]
+
+    def mean_pressure(self, state: State, lagged: Floats) -> Floats:
+        """Return the mean of U'(θ) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
+        del state
+        mean: Floats = np.einsum("mq,mq->m", self._pressure(lagged), self.dV) / self.volume
+        return mean
 
     def cauchy_stress(self, state: State) -> Floats:
         """Return the Cauchy stress at the quadrature points in the stored symmetric order, ``(m, q, 6)``, MPa."""
         self._deform(state.u)
         self._respond()
-        pressure = self.material.volumetric.pressure(self._dilatation)
         stress = self._tau / self._J[:, :, None]
-        stress[:, :, :3] += pressure[:, None, None]
+        stress[:, :, :3] += self._pressure(self._dilatation)[:, :, None]
         return np.asarray(stress)
 
+    def _modes(self, nodes: Floats) -> Floats:
+        return pressure_modes(nodes, self.cell, self.dV)
+
+    def _at_points(self, coefficients: Floats) -> Floats:
+        """Evaluate a field given by its ``coefficients (m, k)`` of the modes at the quadrature points, ``(m, q)``."""
+        return np.asarray((self.modes @ coefficients[:, :, None])[:, :, 0])
+
+    def _pressure(self, dilatation: Floats) -> Floats:
+        """Return U'(θ), projected on the modes, at the quadrature points, ``(m, q)``."""
+        pressure = self.material.volumetric.pressure(self._at_points(dilatation))
+        return self._at_points(np.einsum("mqk,mq->mk", self._share, pressure))
+
+    def _bulk(self, dilatation: Floats) -> Floats:
+        """Return ``∫ ψ_k U''(θ) ψ_l dV / V²``, ``(m, k, k)``."""
+        stiffness = self.material.volumetric.stiffness(self._at_points(dilatation))
+        weighted = self._share * (stiffness / self.volume[:, None])[:, :, None]
+        return np.asarray(weighted.swapaxes(1, 2) @ self.modes)
+
     def _deform(self, u: Floats) -> None:
-        kernels.deformation(u, self.nodes, self.G, self.dV, self._F, self._J, self._dilatation)
+        kernels.deformation(u, self.nodes, self.G, self.dV, self.modes, self._F, self._J, self._dilatation)
 
     def _law(self) -> tuple[Floats, ...]:
         # Evaluate the material; for a law in stretches, the principal directions come last.

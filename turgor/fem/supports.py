@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.elements import TRI6
+from turgor.fem.section import Section, surface_areas
 from turgor.fem.state import State
 from turgor.fem.term import Unlagged, add_at_nodes, pack_symmetric
+from turgor.mesh.cells import face_cell, face_frames
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -33,11 +34,11 @@ class Sliding:
 class Prescribed:
     """The surface moves by a given amount along x, y and z, mm; ``None`` leaves a direction free.
 
-    The displacement grows with the load fraction.
+    The displacement grows with the load fraction. In a plane model there is none along z.
     """
 
     surface: str
-    displacement: tuple[float | None, float | None, float | None]
+    displacement: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -58,33 +59,38 @@ class SpringBed(Unlagged):
     Parameters
     ----------
     points, faces
-        Reference positions ``(n_points, 3)`` and six-node triangles ``(k, 6)``.
+        Reference positions ``(n_points, d)`` and the surface's faces ``(k, nodes_per_face)``.
     stiffness
         k in N/mm³.
     normal_only
         Whether the springs act along the reference normal only.
+    section
+        What a plane mesh stands for.
     """
 
-    def __init__(self, points: Floats, faces: Ints, stiffness: float, normal_only: bool) -> None:
+    def __init__(
+        self, points: Floats, faces: Ints, stiffness: float, normal_only: bool, section: Section | None = None
+    ) -> None:
         self.nodes = np.ascontiguousarray(faces, dtype=np.int32)
-        normal = face_normals(points, self.nodes)
-        area = np.linalg.norm(normal, axis=2)
-        unit = normal / area[:, :, None]
-        direction = np.einsum("fqi,fqj->fqij", unit, unit) if normal_only else np.broadcast_to(np.eye(3), (1, 1, 3, 3))
-        N = TRI6.shape_at_quadrature
-        weight = stiffness * area * TRI6.weights
-        blocks = np.einsum("fq,qa,qb,fqij->faibj", weight, N, N, np.broadcast_to(direction, (*area.shape, 3, 3)))
-        self._blocks = np.ascontiguousarray(blocks).reshape(len(faces), 18, 18)
+        unit, area = surface_areas(points, self.nodes, section)
+        d, n = points.shape[1], faces.shape[1]
+        direction = np.einsum("fqi,fqj->fqij", unit, unit) if normal_only else np.eye(d)
+        N = face_cell(self.nodes).shape_at_quadrature
+        blocks = np.einsum(
+            "fq,qa,qb,fqij->faibj", stiffness * area, N, N, np.broadcast_to(direction, (*area.shape, d, d))
+        )
+        self._blocks = np.ascontiguousarray(blocks).reshape(len(faces), n * d, n * d)
 
     def energy(self, state: State) -> float:
         """Return the energy of the springs, N mm."""
-        local = state.u[self.nodes].reshape(len(self.nodes), 18)
+        local = state.u[self.nodes].reshape(len(self.nodes), -1)
         return 0.5 * float(np.einsum("fi,fij,fj->", local, self._blocks, local))
 
     def force(self, state: State, out: Floats) -> None:
         """Add the springs' force, N."""
-        local = state.u[self.nodes].reshape(len(self.nodes), 18, 1)
-        add_at_nodes(self.nodes, (self._blocks @ local).reshape(-1, 6, 3), out)
+        local = state.u[self.nodes]
+        force = self._blocks @ local.reshape(len(local), -1, 1)
+        add_at_nodes(self.nodes, force.reshape(local.shape), out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the springs' stiffness, N/mm."""
@@ -93,6 +99,5 @@ class SpringBed(Unlagged):
 
 
 def face_normals(points: Floats, faces: Ints) -> Floats:
-    """Return the area-weighted normals ``(k, n_quad, 3)`` of six-node faces at the quadrature points of TRI6."""
-    tangents = np.einsum("qar,fai->fqri", TRI6.gradient_at_quadrature, points[faces])
-    return np.asarray(np.cross(tangents[:, :, 0], tangents[:, :, 1]))
+    """Return the normals ``(k, q, d)`` of faces at their quadrature points, as long as area per reference area."""
+    return face_frames(points[faces])[1]

@@ -13,9 +13,11 @@ from turgor.fem.constraints import compile_constraints
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
-from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
+from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, Vector, body_force, surface_force
 from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import SparsePattern, packed_size
+from turgor.fem.section import PlaneStress, Section, check_section, in_section
+from turgor.fem.sheet import Sheet
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
@@ -42,12 +44,14 @@ class System:
         What acts on it; each has one value in ``State.loads``, named in :attr:`load_names`.
     reinforcements
         What is embedded in the body or laid on it.
+    section
+        What a plane mesh stands for; forces, energies and volumes are those of the slice or the full turn.
 
     Raises
     ------
     InputError
         If a region has no material or a material no region, a name is unknown, a cavity is open, gravity acts on a
-        region without density, or the body is free to move as a whole.
+        region without density, the section does not fit the mesh, or the body is free to move as a whole.
     """
 
     def __init__(
@@ -57,17 +61,20 @@ class System:
         supports: Sequence[Support] = (),
         loads: Sequence[Load] = (),
         reinforcements: Sequence[Fibre | Membrane] = (),
+        section: Section | None = None,
     ) -> None:
         prefer_light_threads()
+        check_section(mesh, section)
         self.mesh = mesh
-        self.solids = _solids(mesh, materials)
+        self.section = section
+        self.solids = _solids(mesh, materials, section)
         self.loads = tuple(loads)
         self.load_names = _load_names(self.loads)
         held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
         springs = [s for s in supports if isinstance(s, ElasticSupport)]
-        self.constraints = compile_constraints(mesh, held)
-        beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only) for s in springs]
-        check_held(mesh, self.constraints, springs)
+        self.constraints = compile_constraints(mesh, held, section)
+        beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only, section) for s in springs]
+        check_held(mesh, self.constraints, springs, section)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
@@ -77,7 +84,7 @@ class System:
 
         free = ~self.constraints.fixed.ravel()
         groups = [term.nodes for term in self.terms]
-        self.pattern = SparsePattern(mesh.n_points, 3, groups, free)
+        self.pattern = SparsePattern(mesh.n_points, mesh.dimension, groups, free)
         self._frames = BlockFrames(self.constraints, groups)
         self._packed = np.empty(self.pattern.packed_offsets[-1])
         self._values = np.empty(self.pattern.n_stored)
@@ -110,7 +117,7 @@ class System:
         return sum(float(growth[term.channel]) * term.conjugate(state) for term in self._loaded)
 
     def load_direction(self, state: State) -> Floats:
-        """Return ∂²Π/∂u∂f ``(n_points, 3)``, N: the derivative of the forces by the load fraction."""
+        """Return ∂²Π/∂u∂f ``(n_points, d)``, N: the derivative of the forces by the load fraction."""
         growth = self.loads_at(1.0) - self.loads_at(0.0)
         total = np.zeros_like(state.u)
         for term in self._loaded:
@@ -124,7 +131,7 @@ class System:
         return sum(term.energy(state) for term in self.terms)
 
     def forces(self, state: State) -> tuple[Floats, float]:
-        """Return ∂Π/∂u ``(n_points, 3)``, N, and the size of the largest term in it: what it is small against."""
+        """Return ∂Π/∂u ``(n_points, d)``, N, and the size of the largest term in it: what it is small against."""
         total = np.zeros_like(state.u)
         scale = 0.0
         for term in self.terms:
@@ -148,7 +155,7 @@ class System:
         return self._values
 
     def stiffness_times(self, du: Floats) -> Floats:
-        """Return the stiffness assembled last times a nodal field ``(n_points, 3)``, fixed components included."""
+        """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
         local = self.constraints.to_frames(du)
         product = np.zeros_like(du)
         for k, term in enumerate(self.terms):
@@ -157,14 +164,14 @@ class System:
         return self.constraints.from_frames(product)
 
     def free_part(self, nodal: Floats) -> Floats:
-        """Return the free components ``(n_dofs,)`` of a nodal vector field ``(n_points, 3)``."""
+        """Return the free components ``(n_dofs,)`` of a nodal vector field ``(n_points, d)``."""
         return self.constraints.to_frames(nodal).ravel()[self.pattern.free]
 
     def nodal(self, free: Floats) -> Floats:
-        """Return the nodal field ``(n_points, 3)`` with the given free components, zero elsewhere."""
+        """Return the nodal field ``(n_points, d)`` with the given free components, zero elsewhere."""
         field = np.zeros(self.mesh.points.size)
         field[self.pattern.free] = free
-        return self.constraints.from_frames(field.reshape(-1, 3))
+        return self.constraints.from_frames(field.reshape(self.mesh.points.shape))
 
     def consistent(self, u: Floats, loads: Floats) -> State:
         """Return the state of displacement `u` in which nothing lags."""
@@ -176,17 +183,17 @@ class System:
         return State(state.u + du, lagged, state.loads)
 
     def dilatation(self, state: State) -> Floats:
-        """Return the lagged dilatation of every element, at an equilibrium its ratio of volumes, ``(n_cells,)``."""
+        """Return the mean lagged dilatation of every element ``(n_cells,)``: at an equilibrium its ratio of volumes."""
         dilatation = np.empty(self.mesh.n_cells)
         for solid, values in zip(self.solids, state.lagged, strict=False):
-            dilatation[solid.index] = values
+            dilatation[solid.index] = solid.dilatation(state, values)
         return dilatation
 
     def element_pressure(self, state: State) -> Floats:
-        """Return U'(θ) of every element, ``(n_cells,)``, MPa: its mean stress, positive in tension."""
+        """Return the mean of U'(θ) over every element, ``(n_cells,)``, MPa: its mean stress, positive in tension."""
         pressure = np.empty(self.mesh.n_cells)
         for solid, values in zip(self.solids, state.lagged, strict=False):
-            pressure[solid.index] = solid.material.volumetric.pressure(values)
+            pressure[solid.index] = solid.mean_pressure(state, values)
         return pressure
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
@@ -196,28 +203,33 @@ class System:
     def _block(self, k: int) -> Floats:
         begin, end = self.pattern.packed_offsets[k : k + 2]
         nodes = self.terms[k].nodes
-        return self._packed[begin:end].reshape(len(nodes), packed_size(3 * nodes.shape[1]))
+        return self._packed[begin:end].reshape(len(nodes), packed_size(self.mesh.dimension * nodes.shape[1]))
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
-        cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity)
+        cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)
         check_rim(cavity, self.constraints)
         return cavity
 
     def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
         nodal = np.zeros_like(self.mesh.points)
         if isinstance(load, Gravity):
+            acceleration = self._components(load.acceleration, "gravity")
             for solid in self.solids:
                 if solid.material.density is None:
                     raise InputError("gravity acts on a material without density", key="density")
-                body_force(solid.nodes, solid.dV, solid.material.density, load.acceleration, nodal)
+                body_force(solid.nodes, solid.dV, solid.material.density, acceleration, nodal)
         else:
-            area = surface_force(self.mesh.points, self.mesh.surface(load.surface), load.vector, nodal)
+            vector = self._components(load.vector, f"loads.{load.surface}")
+            area = surface_force(self.mesh.points, self.mesh.surface(load.surface), vector, self.section, nodal)
             if isinstance(load, Force):
                 nodal /= area
         return DeadLoad(nodal, channel)
 
+    def _components(self, vector: Vector, key: str) -> Floats:
+        return in_section(vector, self.mesh.dimension, self.section, key)
 
-def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> list[Solid]:
+
+def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section | None) -> list[Solid]:
     for name in materials:
         mesh.region(name)
     missing = sorted(set(mesh.regions) - set(materials))
@@ -227,8 +239,9 @@ def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> list[Solid]:
             key="materials",
             expected=f"one for each of {', '.join(mesh.regions)}",
         )
+    kind = Sheet if isinstance(section, PlaneStress) else Solid
     return [
-        Solid(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material)
+        kind(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material, section)
         for name, material in materials.items()
     ]
 

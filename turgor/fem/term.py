@@ -81,9 +81,9 @@ NO_NODES = np.empty((0, 1), np.int32)
 
 
 def add_at_nodes(nodes: Ints, values: Floats, out: Floats) -> None:
-    """Add block vectors ``values (n_blocks, nodes_per_block, 3)`` to ``out (n_points, 3)``."""
+    """Add block vectors ``values (n_blocks, nodes_per_block, d)`` to ``out (n_points, d)``."""
     flat = nodes.ravel()
-    for i in range(3):
+    for i in range(out.shape[1]):
         out[:, i] += np.bincount(flat, values[:, :, i].ravel(), minlength=len(out))
 
 

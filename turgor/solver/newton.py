@@ -218,7 +218,7 @@ def _failure(reason: str, system: System, state: State, residuals: list[float]) 
     facts: dict[str, object] = {"residuals": [float(f"{r:.3g}") for r in residuals]}
     if np.all(np.isfinite(state.u)):
         worst, cell = system.worst_jacobian(state.u)
-        place = system.mesh.points[system.mesh.cells[cell, :4]].mean(axis=0)
+        place = system.mesh.points[system.mesh.cells[cell]].mean(axis=0)
         facts |= {
             "worst_element": cell,
             "worst_element_at_mm": [round(float(x), 3) for x in place],

@@ -1,0 +1,110 @@
+"""Thin sheets in plane stress: the thickness adjusts itself at every quadrature point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.kernels import PACK
+from turgor.fem.solid import TANGENT_SIZE, Solid
+from turgor.fem.state import State
+
+Floats = NDArray[np.float64]
+
+ACROSS = 2
+"""Place of the component across the sheet in the stored order."""
+IN_PLANE = (0, 1, 3)
+
+LARGEST_STEP = 0.5
+MOST_STEPS = 50
+CONVERGED = 1e-12
+
+
+class Sheet(Solid):
+    """∫ min over λ₃ of [W(F̄) + U(J)] dV: the stretch λ₃ across the sheet leaves its faces without stress.
+
+    The minimum is found at each quadrature point by Newton's method on ln λ₃, to rounding, so that force and stiffness
+    are exact derivatives of the energy. The volume constraint is met by the thickness and puts none on the displacement
+    in the plane: there is nothing to lock, and no pressure to project.
+    """
+
+    def worst_jacobian(self, u: Floats) -> tuple[float, int]:
+        """Return the smallest det F in the plane over the quadrature points and the mesh cell where it is."""
+        super()._deform(u)
+        at = int(np.argmin(self._J.min(axis=1)))
+        return float(self._J[at].min()), int(self.index[at])
+
+    def energy(self, state: State) -> float:
+        """Return the strain energy, N mm."""
+        self._deform(state.u)
+        density = self._law()[0].reshape(self.dV.shape) + self.material.volumetric.energy(self._J)
+        return float(np.sum(density * self.dV))
+
+    def dilatation(self, state: State, lagged: Floats) -> Floats:
+        """Return each element's ratio of volumes, ``(m,)``."""
+        del lagged
+        self._deform(state.u)
+        ratio: Floats = np.einsum("mq,mq->m", self._J, self.dV) / self.volume
+        return ratio
+
+    def mean_pressure(self, state: State, lagged: Floats) -> Floats:
+        """Return the mean of U'(J) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
+        del lagged
+        self._deform(state.u)
+        mean: Floats = np.einsum("mq,mq->m", self.material.volumetric.pressure(self._J), self.dV) / self.volume
+        return mean
+
+    def _modes(self, nodes: Floats) -> Floats:
+        return np.empty((*self.dV.shape, 0))
+
+    def _pressure(self, dilatation: Floats) -> Floats:
+        # The volumetric stress is in the Kirchhoff stress already.
+        return np.zeros_like(self.dV)
+
+    def _bulk(self, dilatation: Floats) -> Floats:
+        return np.zeros((len(self.dV), 0, 0))
+
+    def _deform(self, u: Floats) -> None:
+        super()._deform(u)
+        area_ratio = self._J.copy()
+        self._J[:] = 1.0
+        for _ in range(MOST_STEPS):
+            self._F[:, :, 2, 2] = self._J / area_ratio
+            stress, stiffness = self._across()
+            change = np.clip(-stress / stiffness, -LARGEST_STEP, LARGEST_STEP)
+            self._J *= np.exp(change)
+            if np.abs(change).max() <= CONVERGED:
+                break
+        else:
+            self._J[:] = np.nan
+        self._F[:, :, 2, 2] = self._J / area_ratio
+
+    def _across(self) -> tuple[Floats, Floats]:
+        """Return the first and second derivative of the energy by ln λ₃, each ``(m, q)``, MPa."""
+        self._respond_fully()
+        stress = self._tau[:, :, ACROSS]
+        curvature = self._tangent[:, :, PACK[ACROSS, ACROSS]] + 2.0 * stress
+        # Where the energy is not convex yet, go downhill by the bulk modulus.
+        return stress, np.where(curvature > 0.0, curvature, self.material.bulk_modulus)
+
+    def _respond_fully(self) -> None:
+        """Add the volumetric part to Kirchhoff stress and tangent: J U' 1 and (J² U'' + J U') 1⊗1 − 2 J U' I."""
+        super()._respond()
+        pressure = self._J * self.material.volumetric.pressure(self._J)
+        growth = self._J**2 * self.material.volumetric.stiffness(self._J) + pressure
+        for r in range(6):
+            if r < 3:
+                self._tau[:, :, r] += pressure
+                for s in range(r, 3):
+                    self._tangent[:, :, PACK[r, s]] += growth
+            self._tangent[:, :, PACK[r, r]] -= (2.0 if r < 3 else 1.0) * pressure
+
+    def _respond(self) -> None:
+        """Kirchhoff stress and tangent in the plane, the stretch across it eliminated."""
+        self._respond_fully()
+        tangent = self._tangent.reshape(-1, TANGENT_SIZE)
+        across = tangent[:, PACK[ACROSS, ACROSS]]
+        for r in IN_PLANE:
+            for s in IN_PLANE:
+                if s >= r:
+                    tangent[:, PACK[r, s]] -= tangent[:, PACK[r, ACROSS]] * tangent[:, PACK[s, ACROSS]] / across
