@@ -24,8 +24,8 @@ GROWTH = 1.6
 EASY = 7
 """A step that took no more iterations than this lets the next one grow."""
 
-FAILURES = 3
-"""After so many failed steps in a row, volume control looks for what is in the way."""
+FAILURES = 2
+"""After so many failed steps on the way to one load, volume control looks for what is in the way."""
 
 VOLUME_STEPS = 60
 """Steps that volume control may take between two requested loads."""
@@ -171,11 +171,12 @@ class _Walk:
 
     def to(self, target: float) -> None:
         """Walk to the load fraction `target`."""
+        self._failures = 0
         while self.here.fraction < target:
             aim = min(target, self.here.fraction + self.step)
             if target - aim < 0.2 * self.step:
                 aim = target
-            found = self._try(aim)
+            found = self._try(aim, target)
             if found is not None:
                 self.before = self.here
                 self._arrive(found)
@@ -188,45 +189,44 @@ class _Walk:
         self._residuals += found.residuals[:-1]
         self._factorisations += found.factorisations
 
-    def _try(self, aim: float) -> Equilibrium | None:
-        """Attempt one step; shorten the next and return ``None`` if it fails."""
+    def _try(self, aim: float, target: float) -> Equilibrium | None:
+        """Attempt one step towards `target`; shorten the next and return ``None`` if it fails."""
         size = aim - self.here.fraction
         try:
             found = self._attempt(aim, self._predicted(aim))
         except NotConvergedError as error:
             log.info("step to %.4g failed: %s", aim, error.reason)
-            return self._failed(aim, size, error)
+            return self._failed(size, target, error)
         if found.stable is False and self.here.stable is not False and size > 4 * self.options.smallest_step:
             # A long step can land on an unstable branch that a shorter one would not have met.
             log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
             self.step = CUT * size
             return None
-        self._failures = 0
         if found.iterations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
         return found
 
-    def _failed(self, aim: float, size: float, error: NotConvergedError) -> Equilibrium | None:
+    def _failed(self, size: float, target: float, error: NotConvergedError) -> Equilibrium | None:
         """Shorten the step; where that has not helped, go on by volume control."""
         self._failures += 1
         self.step = CUT * size
         if self._failures == FAILURES and not self.system.constraints.moves:
-            found = self._by_volume(aim)
+            found = self._by_volume(target)
             if found is not None:
                 return found
         if self.step < self.options.smallest_step:
             raise self._stopped(error) from error
         return None
 
-    def _by_volume(self, aim: float) -> Equilibrium | None:
-        """Follow the path by volume to the load fraction `aim`, or to the limit before it.
+    def _by_volume(self, target: float) -> Equilibrium | None:
+        """Follow the path by volume to the load fraction `target`, or to the limit before it.
 
         Returns ``None`` where volume control does not get on either.
 
         Raises
         ------
         LimitPressureError
-            If the load has a maximum before `aim`.
+            If the load has a maximum before `target`.
         """
         log.info("going on by volume control from %.4g", self.here.fraction)
         system = self.system
@@ -243,9 +243,9 @@ class _Walk:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
             if previous.rising and not found.rising:
                 raise self._at_limit(walk.limit_between(previous, found))
-            if found.fraction >= aim:
+            if found.fraction >= target:
                 try:
-                    return self._attempt(aim, found.state)
+                    return self._attempt(target, found.state)
                 except NotConvergedError:
                     return None
             self.before, self.here = previous, found
