@@ -1,1 +1,0 @@
-"""The web viewer, which reads stored results."""
