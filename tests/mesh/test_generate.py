@@ -1,10 +1,11 @@
 import math
+import sys
 
 import gmsh
 import numpy as np
 import pytest
 
-from turgor.common.errors import InputError
+from turgor.common.errors import InputError, MissingPackageError
 from turgor.geometry.pneunet import PneuNet
 from turgor.geometry.tube import CappedTube
 from turgor.mesh.faces import boundary_faces, rim_edges
@@ -172,6 +173,12 @@ def test_a_session_of_somebody_else_is_left_alone():
         assert gmsh.isInitialized()
     finally:
         gmsh.finalize()
+
+
+def test_a_missing_gmsh_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    with pytest.raises(MissingPackageError, match="pip install gmsh"):
+        generate(CappedTube())
 
 
 def test_tangled_elements_lose_curvature_and_are_counted():

@@ -28,7 +28,12 @@ _EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity":
 
 
 def save_picture(
-    mesh: Mesh, path: str | Path, *, show: Literal["names", "quality"] = "names", cut: bool = False
+    mesh: Mesh,
+    path: str | Path,
+    *,
+    show: Literal["names", "quality"] = "names",
+    cut: bool = False,
+    window: tuple[int, int] = (1400, 900),
 ) -> None:
     """Draw the skin of a mesh with its elements' edges and save it as a PNG file.
 
@@ -42,7 +47,9 @@ def save_picture(
         Colours by surface ``names`` with fibres and markers, or the ``quality`` (scaled Jacobian) of the element behind
         each face, with the place of the worst element.
     cut
-        Draw only the faces whose element lies at y > 0 of the middle, to look inside.
+        Draw only the faces beyond the middle of y, to look inside.
+    window
+        Width and height in pixels.
 
     Raises
     ------
@@ -54,7 +61,7 @@ def save_picture(
     if Path(path).suffix != ".png":
         raise InputError("a picture is saved as .png", key="path", value=str(path))
     pyvista = require("pyvista")
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 900))
+    plotter = pyvista.Plotter(off_screen=True, window_size=window)
     plotter.set_background("white")
     middle = mesh.points[:, 1].min() if not cut else float(mesh.points[:, 1].mean())
     surfaces = dict(mesh.surfaces) if show == "names" else {"skin": boundary_faces(mesh.cells)}
@@ -78,7 +85,8 @@ def save_picture(
         _add_lines(pyvista, plotter, mesh)
         plotter.add_legend(bcolor="white", size=(0.16, 0.2))
     plotter.view_vector((0.5, -1.0, 0.45), (0, 0, 1))
-    plotter.camera.zoom(1.3)
+    extent = np.ptp(mesh.points, axis=0)
+    plotter.camera.zoom(1.3 if extent[2] < extent.max() else 1.0)  # a tall body fills the height already
     plotter.screenshot(str(path))
     plotter.close()
 

@@ -1,0 +1,23 @@
+"""Draw the pictures of docs/shapes.md: the mesh of every template, cut open where that shows more."""
+
+from pathlib import Path
+
+from turgor.geometry.catalogue import actuator
+from turgor.mesh.generate import generate
+from turgor.mesh.picture import save_picture
+
+PICTURES = {
+    "tube": ({}, None, True),
+    "pneunet": ({"symmetric": True}, None, False),
+    "bellows": ({"model": "quarter"}, None, False),
+    "membrane": ({"segments": 3}, None, True),
+    "honeycomb": ({"columns": 2, "rows": 2, "model": "half"}, None, False),
+    "reinforced-tube": ({"symmetric": True}, None, False),
+    "fibre-tube": ({"length": "140 mm", "fibre_length": "106 mm"}, None, False),
+}
+"""Template → parameters, element size in mm, whether to look inside."""
+
+if __name__ == "__main__":
+    for name, (parameters, size, cut) in PICTURES.items():
+        mesh = generate(actuator(name, **parameters), size)
+        save_picture(mesh, Path(__file__).parent / f"{name}.png", cut=cut, window=(900, 580))
