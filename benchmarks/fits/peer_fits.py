@@ -37,6 +37,9 @@ FELUPE = {
 }
 """FElupe's own models of the same energy (its Ogden takes two terms or more), started from orders of magnitude."""
 
+BOUNDS = {"van-der-waals": ([-np.inf, 0.0, -np.inf, 1.75], [np.inf, 1.0, np.inf, np.inf])}
+"""In FElupe's order mu, beta, a, limit: the share of the second invariant beyond 0 … 1 is no material."""
+
 
 def stretches(mode: str, x: np.ndarray) -> np.ndarray:
     second = {"uniaxial": x**-0.5, "equibiaxial": x, "planar": np.ones_like(x)}[mode]
@@ -93,7 +96,7 @@ def felupe_norm(model: str, tests: list[dict]) -> float | None:
     umat = fem.Hyperelastic(function, **start)
     with np.errstate(all="ignore"):
         try:
-            _, result = umat.optimize(**curves, incompressible=True)
+            _, result = umat.optimize(**curves, incompressible=True, bounds=BOUNDS.get(model, (-np.inf, np.inf)))
         except (ValueError, np.linalg.LinAlgError):
             return None
     return float(np.sqrt(np.sum(result.fun**2)))

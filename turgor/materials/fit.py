@@ -17,6 +17,7 @@ from turgor.materials.inequalities import Limits
 from turgor.materials.kinematics import Array
 from turgor.materials.least_squares import Problem, Solution, solve
 from turgor.materials.measurement import MaterialTest, Specimen
+from turgor.materials.models.ogden import OgdenModel
 from turgor.materials.registry import find_model
 from turgor.materials.registry import models as known_models
 from turgor.materials.stability import digit_sensitivity, principal_stretches, stable_up_to, verdict
@@ -28,9 +29,6 @@ Model = str | type[Hyperelastic]
 
 PLAUSIBLE_RATIOS = {1.5: (1.0, 1.5), 2.0: (0.95, 1.8)}
 """Equibiaxial over uniaxial stress, by stretch, that a constrained fit keeps where only uniaxial tension is known."""
-
-SEARCHED_WHEN_CONSTRAINED = 2
-"""Models with more constants to search for are constrained on request only: it takes them seconds."""
 
 SAMPLES_OF_STABILITY = (24, 200)
 """Stretches of each mode at which a constrained fit keeps stability; the finer ones where it is lost in between and
@@ -204,7 +202,8 @@ def _fits_of(
         if plain is not None:
             found.append(_judged(kind, problem, plain, stretch, volumetric, constrained=False))
     searched = sum(not constant.linear for constant in kind.constants())
-    quick = searched <= SEARCHED_WHEN_CONSTRAINED
+    # Linear models are constrained in no time; the two terms of Ogden's, which fit most rubbers, are worth a second.
+    quick = not searched or (issubclass(kind, OgdenModel) and searched <= 2)
     wanted = stability == "require" or (stability == "prefer" and quick and found and found[0].objections)
     if wanted:
         ratios = {} if biaxial_measured else PLAUSIBLE_RATIOS

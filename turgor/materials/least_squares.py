@@ -22,7 +22,7 @@ from turgor.materials.measurement import MaterialTest
 STARTS_FOLLOWED = 10
 """So many of the best starts are followed to a minimum on the thinned tests (fewer where limits make that slow)."""
 
-STARTS_LIMITED = 5
+STARTS_LIMITED = 3
 
 MINIMA_POLISHED = 3
 """So many of the best minima are followed on all points."""
@@ -213,10 +213,12 @@ def _search(model: type[Hyperelastic], linear: _Linear) -> Array:
     distinct = [m for i, m in enumerate(minima) if i == 0 or m.cost > minima[i - 1].cost * (1.0 + 1e-4)]
     closer = [_descend(linear, found.x, 1e-9, "2-point") for found in distinct[:MINIMA_POLISHED]]
     best = min(closer, key=lambda found: float(found.cost))
-    return np.asarray(_descend(linear, best.x, 1e-15, "3-point").x, dtype=float)
+    return np.asarray(_descend(linear, best.x, 1e-15, "3-point", 500).x, dtype=float)
 
 
-def _descend(linear: _Linear, start: Sequence[float] | Array, tolerance: float, jacobian: str) -> OptimizeResult:
+def _descend(
+    linear: _Linear, start: Sequence[float] | Array, tolerance: float, jacobian: str, evaluations: int = 100
+) -> OptimizeResult:
     low, high = linear.searched_bounds
     width = np.minimum(high - low, 1.0)
     inside = np.clip(start, low + 1e-9 * width, high - 1e-9 * width)
@@ -229,7 +231,7 @@ def _descend(linear: _Linear, start: Sequence[float] | Array, tolerance: float, 
         ftol=tolerance,
         xtol=tolerance,
         gtol=tolerance,
-        max_nfev=100,
+        max_nfev=evaluations,
     )
 
 

@@ -29,8 +29,8 @@ class VanDerWaals(InvariantModel):
     smooth_at_rest: ClassVar[bool] = False
 
     mu: float = modulus()
-    lambda_m: float = number((2.0, 3.0, 5.0, 8.0, 14.0, 30.0), (1.75, 1e3))
-    a: float = number((0.0, 0.2, 0.5), (-5.0, 5.0))
+    lambda_m: float = number((2.0, 3.0, 5.0, 8.0, 14.0, 30.0), (1.75, 1e5))
+    a: float = number((0.0, 0.2, 0.5), (-1e3, 1e3))
     beta: float = number((0.0, 0.5), (0.0, 1.0))
 
     @property
