@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints
 from turgor.fem.fibres import EmbeddedFibre, Fibre
@@ -27,6 +28,8 @@ from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
+
+Reinforcement = Fibre | Membrane | FibreFamily
 
 
 class System:
@@ -60,7 +63,7 @@ class System:
         materials: Mapping[str, Hyperelastic],
         supports: Sequence[Support] = (),
         loads: Sequence[Load] = (),
-        reinforcements: Sequence[Fibre | Membrane] = (),
+        reinforcements: Sequence[Reinforcement] = (),
         section: Section | None = None,
     ) -> None:
         prefer_light_threads()
@@ -79,7 +82,9 @@ class System:
         dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *self.fibres, *self.membranes)
+        self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
+        embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *embedded)
         self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead)
 
         free = ~self.constraints.fixed.ravel()
@@ -209,6 +214,11 @@ class System:
         cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)
         check_rim(cavity, self.constraints)
         return cavity
+
+    def _family(self, family: FibreFamily) -> SpreadFibres:
+        cells = self.mesh.region(family.region)
+        solid = next(solid for solid in self.solids if np.array_equal(solid.index, cells))
+        return SpreadFibres(self.mesh, solid, family)
 
     def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
         nodal = np.zeros_like(self.mesh.points)
