@@ -101,6 +101,11 @@ class EmbeddedFibre:
         """Return the strain energy, N mm."""
         return 0.5 * float(np.sum(self.tension(state.u) ** 2 * self.length)) / self.fibre.axial_stiffness
 
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the work of the lagged axial forces, N mm."""
+        _, length = self._direction(state.u)
+        return float(np.vdot(lagged, length - self.length))
+
     def force(self, state: State, out: Floats) -> None:
         """Add the bars' forces, N."""
         direction, _ = self._direction(state.u)
@@ -112,8 +117,9 @@ class EmbeddedFibre:
         direction, length = self._direction(state.u)
         _fill_stiffness(self._share, direction, self._axial(state.u), lagged / length, out)
 
-    def lagged_at(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the axial forces at displacement `u`, ``(n_bars,)``, N."""
+        del loads
         return self.tension(u)
 
     def lagged_after(self, state: State, du: Floats) -> Floats:

@@ -91,6 +91,11 @@ class BondedMembrane:
         strain = self.strain(state.u)
         return 0.5 * float(np.einsum("fqr,fqr,fq->", strain @ self._law, strain, self.dA))
 
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the work of the lagged stress resultants, N mm."""
+        stress = lagged.reshape(*self.dA.shape, 3)
+        return float(np.einsum("fqr,fqr,fq->", stress, self.strain(state.u), self.dA))
+
     def force(self, state: State, out: Floats) -> None:
         """Add the membrane's forces, N."""
         tangents = self._tangents(state.u)
@@ -110,8 +115,9 @@ class BondedMembrane:
         blocks += np.einsum("fab,ij->faibj", scalar, np.eye(3)).reshape(blocks.shape)
         pack_symmetric(blocks, out)
 
-    def lagged_at(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the stress resultants at displacement `u`, flat, N/mm."""
+        del loads
         return self.stress(u).ravel()
 
     def lagged_after(self, state: State, du: Floats) -> Floats:

@@ -36,6 +36,9 @@ class SparsePattern:
         For each term, the nodes that its blocks couple, ``(n_blocks, nodes_per_block)``.
     free
         Which degrees of freedom are unknown, ``(n_nodes * dimension,)``.
+    couplings
+        Nodes that are coupled too, ``(n, nodes_per_block)``: room for the blocks of :meth:`add_blocks`, which come and
+        go with contact.
 
     Attributes
     ----------
@@ -47,10 +50,17 @@ class SparsePattern:
         Where each group's packed entries begin in the shared buffer, ``(n_groups + 1,)``.
     """
 
-    def __init__(self, n_nodes: int, dimension: int, groups: Sequence[Ints], free: NDArray[np.bool_]) -> None:
+    def __init__(
+        self,
+        n_nodes: int,
+        dimension: int,
+        groups: Sequence[Ints],
+        free: NDArray[np.bool_],
+        couplings: Sequence[Ints] = (),
+    ) -> None:
         self.free = free
         self.n_free = int(free.sum())
-        node_start, node_column = _node_pattern(n_nodes, groups)
+        node_start, node_column = _node_pattern(n_nodes, [*groups, *couplings])
         dof_start = _dof_row_starts(node_start, dimension)
         dof_column = np.empty(dof_start[-1], np.int32)
         _fill_columns(node_start, node_column, dof_start, dimension, dof_column)
@@ -70,10 +80,23 @@ class SparsePattern:
             block_target = target[begin:end].reshape(len(group), packed_size(group.shape[1] * dimension))
             _find_targets(group, node_start, node_column, dof_start, dimension, place, block_target)
         self._source_start, self._source = _invert(target, self.n_stored)
+        self._places = (node_start, node_column, dof_start, dimension, place)
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
         _gather(packed, self._source_start, self._source, out)
+
+    def covers(self, nodes: Ints) -> bool:
+        """Whether all nodes of each block ``(n_blocks, nodes_per_block)`` are coupled in this pattern."""
+        node_start, node_column, *_ = self._places
+        return bool(_all_coupled(nodes, node_start, node_column))
+
+    def add_blocks(self, nodes: Ints, packed: Floats, out: Floats) -> None:
+        """Add packed blocks ``(n_blocks, packed)`` that the pattern covers to the stored values `out`."""
+        target = np.empty(packed.shape, np.int32)
+        _find_targets(nodes, *self._places, target)
+        inside = target >= 0
+        out += np.bincount(target[inside], packed[inside], minlength=self.n_stored)
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
@@ -149,6 +172,20 @@ def _find_targets(group, node_start, node_column, dof_start, dimension, place, t
                     entry = dof_start[b * dimension + k] + dimension * rank[q, p] - k + i
                 target[block, m] = place[entry]
                 m += 1
+
+
+@nb.njit(cache=True)
+def _all_coupled(group, node_start, node_column):  # type: ignore[no-untyped-def]
+    for block in range(len(group)):
+        for p in range(group.shape[1]):
+            for q in range(group.shape[1]):
+                low, high = group[block, p], group[block, q]
+                if low < high:
+                    row = node_column[node_start[low] : node_start[low + 1]]
+                    at = np.searchsorted(row, high)
+                    if at == len(row) or row[at] != high:
+                        return False
+    return True
 
 
 @nb.njit(cache=True)

@@ -40,6 +40,11 @@ class Sheet(Solid):
         density = self._law()[0].reshape(self.dV.shape) + self.material.volumetric.energy(self._J)
         return float(np.sum(density * self.dV))
 
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the strain energy, N mm: nothing lags."""
+        del lagged
+        return self.energy(state)
+
     def dilatation(self, state: State, lagged: Floats) -> Floats:
         """Return each element's ratio of volumes, ``(m,)``."""
         del lagged

@@ -18,6 +18,9 @@ Ints = NDArray[np.int32]
 
 TANGENT_SIZE = 21
 
+AUGMENTATION = 10.0
+"""Shear moduli that stand for the bulk modulus in the merit of a mixed step."""
+
 
 class Solid:
     """∫ W(F̄) + U(θ) dV over one material region, θ the projection of J on the pressure modes of each element.
@@ -38,6 +41,11 @@ class Solid:
         The hyperelastic law of the region.
     section
         What a plane mesh stands for.
+
+    Attributes
+    ----------
+    surface
+        Size of the derivative of each element's volume by its nodes, ``(m,)``, mm²: what a pressure in it acts on.
     """
 
     def __init__(
@@ -54,6 +62,7 @@ class Solid:
         self.cell = body_cell(self.nodes)
         self.G, self.dV = reference_gradients(points[self.nodes], self.cell, section)
         self.volume = self.dV.sum(axis=1)
+        self.surface = np.linalg.norm(np.einsum("mqsa,mq->msa", self.G, self.dV), axis=(1, 2))
         self.modes = self._modes(points[self.nodes])
         self._share = self.modes * (self.dV / self.volume[:, None])[:, :, None]
         m, q, _, n = self.G.shape
@@ -65,8 +74,9 @@ class Solid:
         self._force = np.empty((m, n, self.cell.dimension))
         self._places = kernels.packing(n, self.cell.dimension)
 
-    def lagged_at(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the coefficients of θ at displacement `u`, ``(m, k)``; the first is the element's ratio of volumes."""
+        del loads
         self._deform(u)
         return self._dilatation.copy()
 
@@ -88,6 +98,19 @@ class Solid:
         self._deform(state.u)
         density = self._law()[0].reshape(self.dV.shape)
         volumetric = self.material.volumetric.energy(self._at_points(self._dilatation))
+        return float(np.sum((density + volumetric) * self.dV))
+
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the energy with its volumetric part linearised at the lagged θ, N mm.
+
+        An augmented Lagrangian: a small multiple of the squared deviation from them keeps it bounded below.
+        """
+        self._deform(state.u)
+        density = self._law()[0].reshape(self.dV.shape)
+        law, expected = self.material.volumetric, self._at_points(lagged)
+        deviation = self._at_points(self._dilatation) - expected
+        bulk = AUGMENTATION * self.material.shear_modulus
+        volumetric = law.energy(expected) + law.pressure(expected) * deviation + 0.5 * bulk * deviation**2
         return float(np.sum((density + volumetric) * self.dV))
 
     def force(self, state: State, out: Floats) -> None:

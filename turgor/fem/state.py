@@ -24,15 +24,22 @@ class State:
         way they lag behind it, and the tangent uses the forces that belong to them.
     loads
         Value of every load ``(n_loads,)``: a cavity's pressure in MPa, a factor for the others.
+    penalty
+        Factor on the stiffness of contact: raised where surfaces would overlap too much, else one.
     """
 
     u: Floats
     lagged: tuple[Floats, ...]
     loads: Floats
+    penalty: float = 1.0
 
     def with_loads(self, loads: Floats) -> State:
         """Return a copy under other loads."""
         return replace(self, loads=loads)
+
+    def moved(self, du: Floats) -> State:
+        """Return a copy displaced by `du` ``(n_points, 3)``, nothing else changed."""
+        return replace(self, u=self.u + du)
 
     def beyond(self, before: State, reach: float) -> State:
         """Return the state `reach` times the way from `before` to this one further on, in a straight line."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from turgor.common.errors import InputError
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints
+from turgor.fem.contact.obstacle import Obstacle
+from turgor.fem.contact.spec import ContactCase, RigidContact, make_contact
+from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
@@ -28,6 +32,7 @@ from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
 
 Reinforcement = Fibre | Membrane | FibreFamily
 
@@ -49,6 +54,8 @@ class System:
         What is embedded in the body or laid on it.
     section
         What a plane mesh stands for; forces, energies and volumes are those of the slice or the full turn.
+    contact
+        What may touch what. A rigid body that moves is a load too: its factor is in ``State.loads``.
 
     Raises
     ------
@@ -65,13 +72,15 @@ class System:
         loads: Sequence[Load] = (),
         reinforcements: Sequence[Reinforcement] = (),
         section: Section | None = None,
+        contact: Sequence[ContactCase] = (),
     ) -> None:
         prefer_light_threads()
         check_section(mesh, section)
         self.mesh = mesh
         self.section = section
         self.solids = _solids(mesh, materials, section)
-        self.loads = tuple(loads)
+        moving = [c for c in contact if isinstance(c, RigidContact) and c.motion is not None]
+        self.loads = (*loads, *moving)
         self.load_names = _load_names(self.loads)
         held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
         springs = [s for s in supports if isinstance(s, ElasticSupport)]
@@ -79,20 +88,21 @@ class System:
         beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only, section) for s in springs]
         check_held(mesh, self.constraints, springs, section)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
-        dead = [self._dead_load(load, k) for k, load in enumerate(self.loads) if not isinstance(load, Pressure)]
+        dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
+        self.contacts = [self._contact(materials, case) for case in contact]
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *embedded)
-        self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead)
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *embedded, *self.contacts)
+        pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
+        self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead, *pushed)
 
-        free = ~self.constraints.fixed.ravel()
-        groups = [term.nodes for term in self.terms]
-        self.pattern = SparsePattern(mesh.n_points, mesh.dimension, groups, free)
-        self._frames = BlockFrames(self.constraints, groups)
+        self._couplings: list[Ints] = [c.couplings(np.zeros_like(mesh.points)) for c in self.contacts]
+        self._touching: list[tuple[Ints, Floats]] = []
+        self.pattern = self._make_pattern()
+        self._frames = BlockFrames(self.constraints, [term.nodes for term in self.terms])
         self._packed = np.empty(self.pattern.packed_offsets[-1])
-        self._values = np.empty(self.pattern.n_stored)
 
     @property
     def n_dofs(self) -> int:
@@ -149,15 +159,23 @@ class System:
     def stiffness(self, state: State) -> Floats:
         """Return the stored values of ∂²Π/∂u² on the free degrees of freedom, in the pattern's order.
 
-        The array is used again by the next call.
+        Where the pattern has no room for what touches now, :attr:`pattern`
+        is another one afterwards.
         """
         for k, term in enumerate(self.terms):
             block = self._block(k)
             if block.size:
                 term.stiffness(state, state.lagged[k], block)
                 self._frames.turn(k, block)
-        self.pattern.sum_blocks(self._packed, self._values)
-        return self._values
+        self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
+        if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
+            self._couplings += [contact.couplings(state.u) for contact in self.contacts]
+            self.pattern = self._make_pattern()
+        values = np.empty(self.pattern.n_stored)
+        self.pattern.sum_blocks(self._packed, values)
+        for nodes, packed in self._touching:
+            self.pattern.add_blocks(nodes, packed, values)
+        return values
 
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
@@ -166,6 +184,8 @@ class System:
         for k, term in enumerate(self.terms):
             if term.nodes.shape[1] > 1 and len(term.nodes):
                 block_products(term.nodes, self._block(k), local, product)
+        for nodes, packed in self._touching:
+            block_products(nodes, packed, local, product)
         return self.constraints.from_frames(product)
 
     def free_part(self, nodal: Floats) -> Floats:
@@ -178,14 +198,26 @@ class System:
         field[self.pattern.free] = free
         return self.constraints.from_frames(field.reshape(self.mesh.points.shape))
 
-    def consistent(self, u: Floats, loads: Floats) -> State:
+    def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0) -> State:
         """Return the state of displacement `u` in which nothing lags."""
-        return State(u, tuple(term.lagged_at(u) for term in self.terms), loads)
+        return State(u, tuple(term.lagged_at(u, loads) for term in self.terms), loads, penalty)
 
     def advanced(self, state: State, du: Floats) -> State:
         """Return the state after Newton's step `du`, what lags updated as the step predicts."""
         lagged = tuple(term.lagged_after(state, du) for term in self.terms)
-        return State(state.u + du, lagged, state.loads)
+        return replace(state, u=state.u + du, lagged=lagged)
+
+    def merit(self, state: State, lagged: tuple[Floats, ...]) -> float:
+        """Return the energy that a line search goes by, N mm; `lagged` are the values that a full step predicts."""
+        return sum(term.merit(state, values) for term, values in zip(self.terms, lagged, strict=True))
+
+    def longest_step(self, state: State, du: Floats) -> float:
+        """Return the part of Newton's step `du`, at most 1, up to which no surfaces overlap too far to be seen."""
+        return min((contact.longest_step(state, du) for contact in self.contacts), default=1.0)
+
+    def touches(self, state: State) -> list[Touch]:
+        """Return how each contact stands."""
+        return [contact.touch(state) for contact in self.contacts]
 
     def dilatation(self, state: State) -> Floats:
         """Return the mean lagged dilatation of every element ``(n_cells,)``: at an equilibrium its ratio of volumes."""
@@ -209,6 +241,21 @@ class System:
         begin, end = self.pattern.packed_offsets[k : k + 2]
         nodes = self.terms[k].nodes
         return self._packed[begin:end].reshape(len(nodes), packed_size(self.mesh.dimension * nodes.shape[1]))
+
+    def _make_pattern(self) -> SparsePattern:
+        free = ~self.constraints.fixed.ravel()
+        groups = [term.nodes for term in self.terms]
+        return SparsePattern(self.mesh.n_points, self.mesh.dimension, groups, free, self._couplings)
+
+    def _touching_blocks(self, contact: Contact, state: State) -> tuple[Ints, Floats]:
+        nodes, packed = contact.blocks(state, state.lagged[self.terms.index(contact)])
+        BlockFrames(self.constraints, [nodes]).turn(0, packed)
+        return nodes, packed
+
+    def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase) -> Contact:
+        pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
+        channel = self.loads.index(case) if isinstance(case, RigidContact) and case.motion is not None else None
+        return make_contact(self.mesh, materials, case, pressure, channel)
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)
@@ -256,13 +303,15 @@ def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section 
     ]
 
 
-def _load_names(loads: Sequence[Load]) -> tuple[str, ...]:
+def _load_names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:
     names: list[str] = []
     for load in loads:
         if isinstance(load, Pressure):
             name = f"pressure:{load.cavity}"
         elif isinstance(load, Gravity):
             name = "gravity"
+        elif isinstance(load, RigidContact):
+            name = f"motion:{load.name}"
         else:
             name = f"{type(load).__name__.lower()}:{load.surface}"
         if name in names and isinstance(load, Pressure):

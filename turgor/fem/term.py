@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Protocol
 
 import numpy as np
@@ -39,27 +40,44 @@ class Term(Protocol):
         """Fill the packed upper triangles of the block stiffnesses, ``out (n_blocks, packed)``, N/mm."""
         ...
 
-    def lagged_at(self, u: Floats) -> Floats:
-        """Return the lagged quantities that belong to the displacement `u`."""
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
+        """Return the lagged quantities that belong to the displacement `u` under the loads."""
         ...
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
         """Return the lagged quantities after the step `du`, linearised at the state."""
         ...
 
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the energy that a line search goes by, N mm.
 
-class Unlagged:
+        Where what lags is stiff, it is linearised at the lagged values: along a step of the mixed problem the energy
+        itself first rises by the square of the step times that stiffness.
+        """
+        ...
+
+
+class Unlagged(ABC):
     """A term of which nothing lags behind the displacement."""
 
-    def lagged_at(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return nothing."""
-        del u
+        del u, loads
         return NOTHING
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
         """Return nothing."""
         del state, du
         return NOTHING
+
+    @abstractmethod
+    def energy(self, state: State) -> float:
+        """Return the energy in N mm."""
+
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the energy, N mm."""
+        del lagged
+        return self.energy(state)
 
 
 class Loaded(Protocol):

@@ -11,6 +11,7 @@ import importlib.metadata
 import os
 import weakref
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -43,6 +44,10 @@ class LinearSolver(ABC):
     name: ClassVar[str]
 
     def __init__(self, row_start: Ints, column: Ints) -> None:
+        self.take(row_start, column)
+
+    def take(self, row_start: Ints, column: Ints) -> None:
+        """Begin anew with another pattern; the factors are lost."""
         self.row_start = row_start
         self.column = column
         self.n = len(row_start) - 1
@@ -92,10 +97,17 @@ class Pardiso(LinearSolver):
     name = "MKL PARDISO"
 
     def __init__(self, row_start: Ints, column: Ints) -> None:
-        super().__init__(row_start, column)
         library = _mkl()
         assert library is not None
         self._pardiso = library.pardiso
+        self._release: Callable[[], object] = _nothing
+        super().__init__(row_start, column)
+
+    def take(self, row_start: Ints, column: Ints) -> None:
+        """Begin anew with another pattern; the memory of the factors is set free."""
+        self._release()
+        self._release = _nothing
+        super().take(row_start, column)
         self._handle = np.zeros(64, np.int64)
         self._values: Floats = np.zeros(len(column))
         self._analysed = False
@@ -117,7 +129,7 @@ class Pardiso(LinearSolver):
             self._call(_ANALYSE)
             self._analysed = True
             matrix = (_EMPTY, self.row_start, self.column)
-            weakref.finalize(
+            self._release = weakref.finalize(
                 self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
             )
         self._call(_FACTORISE)
@@ -158,6 +170,10 @@ class Pardiso(LinearSolver):
 _EMPTY = np.zeros(1)
 
 
+def _nothing() -> None:
+    """Release nothing."""
+
+
 def _pardiso_call(
     function: Any,
     phase: int,
@@ -195,8 +211,9 @@ class SuperLU(LinearSolver):
 
     name = "SuperLU"
 
-    def __init__(self, row_start: Ints, column: Ints) -> None:
-        super().__init__(row_start, column)
+    def take(self, row_start: Ints, column: Ints) -> None:
+        """Begin anew with another pattern."""
+        super().take(row_start, column)
         row = np.repeat(np.arange(self.n), np.diff(row_start))
         self._row, self._off = row, row != column
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,12 @@ class NotConvergedError(SolverError):
 
 
 SMALLEST_DAMPING = 1 / 32
+TRIALS = 5
+"""Lengths of a step that a line search tries."""
+
+ROUNDING = 1e-9
+"""Part of the merit by which it may rise through rounding."""
+
 NEAR = 1e-2
 """A tangent at a relative residual below this speaks for the equilibrium that the iteration then reaches."""
 
@@ -159,7 +165,7 @@ def find_equilibrium(
         if len(residuals) > options.max_iterations:
             raise _failure(f"no equilibrium within {options.max_iterations} iterations", system, state, residuals)
         try:
-            linear.factorise(system.stiffness(state))
+            factorise_tangent(system, linear, state)
         except SingularMatrixError as error:
             raise _failure("the stiffness is singular", system, state, residuals) from error
         if moving:
@@ -175,21 +181,58 @@ def find_equilibrium(
             compliance = -float(np.vdot(direction, response))
             change = (gap + float(np.vdot(direction, du))) / compliance
             du += change * response
-        state, damping = _advanced(system, state, du, residuals)
+        state, damping = _advanced(system, state, du, residuals, search=conjugate is None)
         fraction += damping * change
         state = state.with_loads(system.loads_at(fraction))
 
 
-def _advanced(system: System, state: State, du: Floats, residuals: list[float]) -> tuple[State, float]:
-    """Return the state after the step, shortened where it would turn an element inside out, and by how much."""
-    damping = 1.0
-    while damping >= SMALLEST_DAMPING:
-        step = damping * du
-        worst, _ = system.worst_jacobian(state.u + step)
+def factorise_tangent(system: System, linear: LinearSolver, state: State) -> None:
+    """Factorise the stiffness of a state, whose pattern is a new one where surfaces have come close to each other.
+
+    Raises
+    ------
+    SingularMatrixError
+        If it cannot be done.
+    """
+    values = system.stiffness(state)
+    if linear.column is not system.pattern.column:
+        linear.take(system.pattern.row_start, system.pattern.column)
+    linear.factorise(values)
+
+
+def _advanced(system: System, state: State, du: Floats, residuals: list[float], *, search: bool) -> tuple[State, float]:
+    """Return the state after the step and the part of it that was taken.
+
+    It is shortened where surfaces would pass into each other too far, where it would turn an element inside out,
+    and, where surfaces may touch and a search is allowed, until the merit falls. What lags takes the values of
+    the full step all the same: they are the solution of the linear problem, not something to be approached.
+    """
+    lagged = system.advanced(state, du).lagged
+    damping = system.longest_step(state, du)
+    smallest = SMALLEST_DAMPING * damping
+    while damping >= smallest:
+        worst, _ = system.worst_jacobian(state.u + damping * du)
         if worst > 0.0:
-            return system.advanced(state, step), damping
+            if search and system.contacts:
+                damping = _searched(system, state, du, lagged, damping)
+            return replace(state, u=state.u + damping * du, lagged=lagged), damping
         damping *= 0.5
-    raise _failure("an element would turn inside out", system, system.consistent(state.u + du, state.loads), residuals)
+    raise _failure(
+        "an element would turn inside out",
+        system,
+        system.consistent(state.u + du, state.loads, state.penalty),
+        residuals,
+    )
+
+
+def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float) -> float:
+    """Return the longest of a few ever shorter parts of the step with which the merit falls, or else the best."""
+    start = system.merit(state, lagged)
+    parts, merits = [longest], [system.merit(state.moved(longest * du), lagged)]
+    while merits[-1] > start + ROUNDING * abs(start) and len(parts) < TRIALS:
+        parts.append(0.5 * parts[-1])
+        merits.append(system.merit(state.moved(parts[-1] * du), lagged))
+    return parts[int(np.argmin(merits))]
 
 
 def _accepted(
@@ -200,17 +243,17 @@ def _accepted(
     residuals: list[float],
     compliance: float | None,
 ) -> Equilibrium:
-    state = system.consistent(state.u, state.loads)
+    state = system.consistent(state.u, state.loads, state.penalty)
     factorisations = len(residuals) - 1
     if factorisations == 0 or residuals[-2] > NEAR:
-        linear.factorise(system.stiffness(state))
+        factorise_tangent(system, linear, state)
         factorisations += 1
     return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots, compliance)
 
 
 def _rounding(system: System) -> float:
     """Return the size of the forces, N, that rounding alone causes: bulk modulus times area times a few units."""
-    squares = sum(float(np.sum(s.material.bulk_modulus**2 * s.volume ** (4 / 3))) for s in system.solids)
+    squares = sum(float(np.sum((s.material.bulk_modulus * s.surface) ** 2)) for s in system.solids)
     return 10.0 * np.finfo(float).eps * float(np.sqrt(squares))
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
+from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.loads import Pressure
 from turgor.fem.state import State
 from turgor.fem.system import System
@@ -257,15 +258,26 @@ class _Walk:
             if self.on_progress is not None:
                 self.on_progress(aim, iteration, residual)
 
-        return find_equilibrium(self.system, self.linear, guess, aim, self.options.newton, report)
+        found = find_equilibrium(self.system, self.linear, guess, aim, self.options.newton, report)
+        while (overlap := _overlap(self.system, found.state)) > LARGEST_OVERLAP:
+            penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
+            log.info("overlap of %.2g of the wall: contact made stiffer, factor %.3g", overlap, penalty)
+            self._count(found)
+            stiffer = replace(found.state, penalty=penalty)
+            found = find_equilibrium(self.system, self.linear, stiffer, aim, self.options.newton, report)
+        return found
 
     def _predicted(self, aim: float) -> State:
-        """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out."""
+        """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out.
+
+        It ends where surfaces would pass into each other too far.
+        """
         here = self.here
         if self.before is None:
             return here.state
         reach = (aim - here.fraction) / (here.fraction - self.before.fraction)
         reach = min(reach, 2.0)
+        reach *= self.system.longest_step(here.state, reach * (here.state.u - self.before.state.u))
         predicted = here.state.beyond(self.before.state, reach)
         return predicted if self.system.worst_jacobian(predicted.u)[0] > 0.0 else here.state
 
@@ -303,6 +315,11 @@ class _Walk:
 def _load_text(facts: dict[str, object]) -> str:
     pressures = [f"{value:.4g} kPa in {name[9:-4]}" for name, value in facts.items() if name.startswith("pressure:")]
     return ", ".join(pressures) or f"{facts['last_fraction']:.4g} of the load"
+
+
+def _overlap(system: System, state: State) -> float:
+    """Return the largest overlap of any contact over the wall there."""
+    return max((touch.overlap_per_wall for touch in system.touches(state)), default=0.0)
 
 
 def output_fractions(steps: int) -> list[float]:

@@ -14,7 +14,7 @@ import numpy as np
 from turgor.common.log import logger
 from turgor.fem.system import System
 from turgor.solver.linear import LinearSolver
-from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
 
 log = logger("solver")
 
@@ -124,14 +124,14 @@ class VolumeWalk:
         return LimitPoint(best, ends[0][1] > 0, self._mode(best))
 
     def _with_compliance(self, equilibrium: Equilibrium) -> Equilibrium:
-        self.linear.factorise(self.system.stiffness(equilibrium.state))
+        factorise_tangent(self.system, self.linear, equilibrium.state)
         direction = self.system.load_direction(equilibrium.state)
         response = self.linear.solve(self.system.free_part(direction))
         return replace(equilibrium, compliance=float(self.system.free_part(direction) @ response))
 
     def _mode(self, equilibrium: Equilibrium) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
         """Return the eigenmode of the smallest eigenvalue in size, by inverse iteration."""
-        self.linear.factorise(self.system.stiffness(equilibrium.state))
+        factorise_tangent(self.system, self.linear, equilibrium.state)
         vector = self.system.free_part(self.system.load_direction(equilibrium.state))
         for _ in range(4):
             vector = self.linear.solve(vector)

@@ -1,0 +1,1 @@
+"""Contact of the body with itself and with rigid bodies."""

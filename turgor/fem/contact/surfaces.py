@@ -1,0 +1,204 @@
+"""Contact between surfaces of the body, self-contact included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.contact.pairs import NOWHERE, find_partners, gap_gradients, pair_stiffness
+from turgor.fem.contact.skin import STIFFNESS, Skin
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
+from turgor.fem.pattern import packed_size
+from turgor.fem.state import State
+from turgor.fem.term import NO_NODES, add_at_nodes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Indices = NDArray[np.intp]
+
+REACH = 3.0
+"""Before a step, pairs are watched whose gap is up to so many face sizes."""
+
+SOON = 0.5
+"""Faces whose gap is below so many face sizes are given room in the matrix."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Points of the skin and the faces they meet.
+
+    ``face`` and ``quad`` ``(n,)`` number the quadrature point, ``masters`` ``(n,)`` the face opposite; ``at`` and
+    ``local`` ``(n, 2)`` are the local coordinates on both, ``gap`` ``(n,)`` is negative where they overlap.
+    """
+
+    face: Indices
+    quad: Indices
+    masters: Ints
+    at: Floats
+    local: Floats
+    gap: Floats
+
+    def where(self, keep: NDArray[np.bool_]) -> Pairs:
+        """Return some of the pairs."""
+        return Pairs(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+
+class SurfaceContact:
+    """½ Σ ε w min(0, g)² over the quadrature points of all faces, w half the reference area of a point, g its gap.
+
+    Every face is slave and master at once, hence the half. What lags are the overlaps: the geometric part of the
+    stiffness takes the force that the last step predicted, F ← ε w min(0, g + ∂g·δu), so that a first
+    touch or a long step does not throw the iteration off.
+
+    Parameters
+    ----------
+    skin
+        The faces.
+    group
+        Number of each face's group ``(k,)``: only faces of different groups meet. ``None``: any may meet any.
+    name
+        Of the contact.
+    """
+
+    nodes = NO_NODES
+
+    def __init__(self, skin: Skin, group: Ints | None, name: str) -> None:
+        self.skin = skin
+        self.name = name
+        self._group = group
+        self._found: tuple[Floats, Pairs] | None = None
+
+    def energy(self, state: State) -> float:
+        """Return the energy, N mm."""
+        pairs = self._touching(state.u)
+        return 0.5 * float(np.sum(self._normal_stiffness(state, pairs) * pairs.gap**2))
+
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the energy: the overlaps are not stiff enough to be taken as unknowns in it."""
+        del lagged
+        return self.energy(state)
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the contact forces, N."""
+        pairs = self._touching(state.u)
+        force = self._normal_stiffness(state, pairs) * pairs.gap
+        add_at_nodes(self._nodes(pairs), force[:, None, None] * self._gradients(state.u, pairs), out)
+
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
+        """Fill nothing: all of the stiffness is in :meth:`blocks`."""
+
+    def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
+        """Return the twelve nodes of each pair that overlaps and the packed stiffnesses."""
+        pairs = self._touching(state.u)
+        nodes = self._nodes(pairs)
+        packed = np.empty((len(nodes), packed_size(36)))
+        stiffness = self._normal_stiffness(state, pairs)
+        force = stiffness * np.minimum(lagged[pairs.face, pairs.quad], 0.0)
+        x = self.skin.points + state.u
+        slaves, masters = self.skin.faces[pairs.face], self.skin.faces[pairs.masters]
+        pair_stiffness(x, slaves, masters, pairs.at, pairs.local, pairs.gap, stiffness, force, packed)
+        return nodes, packed
+
+    def couplings(self, u: Floats) -> Ints:
+        """Return the nodes of all pairs of faces near each other, of which one meets something soon."""
+        skin, x = self.skin, self.skin.points + u
+        start, second = skin.candidates(x, SOON * skin.size, self._group)
+        pairs = self._pairs(x, start, second, SOON * skin.size)
+        awake = np.zeros(len(skin.faces), bool)
+        awake[pairs.face] = awake[pairs.masters] = True
+        first = np.repeat(np.arange(len(skin.faces)), np.diff(start))
+        keep = (awake[first] | awake[second]) & (first < second)
+        near = np.stack([first[keep], second[keep]], axis=1)
+        return np.concatenate([skin.faces[near].reshape(-1, 12), self._nodes(pairs)])
+
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
+        """Return the gap of every quadrature point that overlaps something, else zero, ``(k, q)``, mm."""
+        del loads
+        pairs = self._touching(u)
+        return self._at_points(pairs, pairs.gap)
+
+    def lagged_after(self, state: State, du: Floats) -> Floats:
+        """Return the gaps that the step `du` predicts, ``(k, q)``, never positive."""
+        pairs = self._touching(state.u)
+        return self._at_points(pairs, np.minimum(pairs.gap + self._rates(state.u, pairs, du), 0.0))
+
+    def longest_step(self, state: State, du: Floats) -> float:
+        """Return the part of the step `du` up to which no overlap grows too much to be seen.
+
+        First by the rates of the gaps, for all pairs in reach; then by looking, for pairs that were not in
+        sight, or turned on the way.
+        """
+        skin, x = self.skin, self.skin.points + state.u
+        reach = REACH * skin.size
+        pairs = self._pairs(x, *skin.candidates(x, reach, self._group), reach)
+        growth = GROWTH_OF_OVERLAP * self._depth(pairs)
+        rate = self._rates(state.u, pairs, du)
+        closing = rate < 0.0
+        step = 1.0
+        if closing.any():
+            step = min(1.0, float(((np.maximum(pairs.gap, 0.0) + growth)[closing] / -rate[closing]).min()))
+        before = self.lagged_at(state.u, state.loads)
+        for _ in range(TRIALS):
+            after = self._touching(state.u + step * du)
+            grown = before[after.face, after.quad] - after.gap
+            excess = (grown / (2.0 * GROWTH_OF_OVERLAP * self._depth(after))).max(initial=0.0)
+            if excess <= 1.0:
+                break
+            step *= 0.5
+        return step
+
+    def touch(self, state: State) -> Touch:
+        """Return area and overlaps."""
+        pairs = self._touching(state.u)
+        wall = np.minimum(self.skin.wall[pairs.face], self.skin.wall[pairs.masters])
+        return Touch(
+            self.name,
+            area=0.5 * float(self.skin.area[pairs.face, pairs.quad].sum()),
+            overlap=float((-pairs.gap).max(initial=0.0)),
+            overlap_per_wall=float((-pairs.gap / wall).max(initial=0.0)),
+        )
+
+    def _touching(self, u: Floats) -> Pairs:
+        # All functions of one state ask in turn: the answer to the last question is kept, and nothing else.
+        if self._found is None or not np.array_equal(self._found[0], u):
+            x = self.skin.points + u
+            pairs = self._pairs(x, *self.skin.candidates(x, 0.0, self._group), 0.0)
+            self._found = (u.copy(), pairs.where(pairs.gap < 0.0))
+        return self._found[1]
+
+    def _pairs(self, x: Floats, start: Indices, candidates: Ints, reach: float) -> Pairs:
+        skin = self.skin
+        shape = skin.area.shape
+        partner, local, gap = np.empty(shape, np.int32), np.empty((*shape, 2)), np.empty(shape)
+        find_partners(x, skin.faces, skin.rule, start, candidates, skin.depth, reach, partner, local, gap)
+        face, quad = np.nonzero(partner != NOWHERE)
+        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], gap[face, quad])
+
+    def _nodes(self, pairs: Pairs) -> Ints:
+        return np.hstack([self.skin.faces[pairs.face], self.skin.faces[pairs.masters]])
+
+    def _gradients(self, u: Floats, pairs: Pairs) -> Floats:
+        skin = self.skin
+        gradient = np.empty((len(pairs.gap), 12, 3))
+        slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
+        gap_gradients(skin.points + u, slaves, masters, pairs.at, pairs.local, gradient)
+        return gradient
+
+    def _rates(self, u: Floats, pairs: Pairs, du: Floats) -> Floats:
+        return np.asarray(np.einsum("nai,nai->n", self._gradients(u, pairs), du[self._nodes(pairs)]))
+
+    def _normal_stiffness(self, state: State, pairs: Pairs) -> Floats:
+        skin = self.skin
+        load = np.minimum(skin.load[pairs.face], skin.load[pairs.masters])
+        wall = np.minimum(skin.wall[pairs.face], skin.wall[pairs.masters])
+        return np.asarray(state.penalty * STIFFNESS * load / wall * 0.5 * skin.area[pairs.face, pairs.quad])
+
+    def _depth(self, pairs: Pairs) -> Floats:
+        return np.minimum(self.skin.depth[pairs.face], self.skin.depth[pairs.masters])
+
+    def _at_points(self, pairs: Pairs, values: Floats) -> Floats:
+        field = np.zeros(self.skin.area.shape)
+        field[pairs.face, pairs.quad] = values
+        return field

@@ -1,0 +1,72 @@
+"""What the terms of contact share, and what they tell about a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.state import State
+from turgor.fem.term import Term
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+LARGEST_OVERLAP = 0.01
+"""An equilibrium counts only where no overlap is more than this part of the wall behind it."""
+
+GROWTH_OF_OVERLAP = 1.0 / 3.0
+"""Part of the depth that the search sees by which an overlap may grow in one step of Newton's method."""
+
+TRIALS = 6
+
+
+@dataclass(frozen=True)
+class Touch:
+    """How one contact stands in a state.
+
+    Attributes
+    ----------
+    name
+        Of the contact.
+    area
+        Reference area in contact, mm²; of surfaces that touch each other, half the area of both.
+    overlap
+        The largest overlap, mm.
+    overlap_per_wall
+        The largest overlap over the thickness of the wall there.
+    force, torque
+        What a rigid body feels, N and N mm, the torque about its reference point; ``None`` for contact of the
+        body with itself.
+    """
+
+    name: str
+    area: float
+    overlap: float
+    overlap_per_wall: float
+    force: tuple[float, float, float] | None = None
+    torque: tuple[float, float, float] | None = None
+
+
+class Contact(Term, Protocol):
+    """A term whose stiffness couples other nodes in every state."""
+
+    name: str
+
+    def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
+        """Return the nodes ``(n_blocks, nodes_per_block)`` coupled now and their packed stiffnesses."""
+        ...
+
+    def couplings(self, u: Floats) -> Ints:
+        """Return blocks of nodes that may come to be coupled near the displacement `u`."""
+        ...
+
+    def longest_step(self, state: State, du: Floats) -> float:
+        """Return the part of the step `du`, at most 1, up to which no overlap grows too much to be seen."""
+        ...
+
+    def touch(self, state: State) -> Touch:
+        """Return how the contact stands."""
+        ...
