@@ -13,9 +13,10 @@ from turgor.fem.fibres import Fibre
 from turgor.fem.frames import unpack_symmetric
 from turgor.fem.loads import Traction
 from turgor.fem.pattern import packed_size
+from turgor.fem.section import PlaneStrain
 from turgor.fem.supports import Clamped, Prescribed, Sliding
 from turgor.fem.system import System
-from turgor.mesh.structured import box, shell_octant
+from turgor.mesh.structured import box, rectangle, shell_octant, tube_sector
 from turgor.solver.path import solve_path
 
 PLANES = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
@@ -47,6 +48,12 @@ def test_derivatives(octant, tension_only):
     assert strain.min() < -1e-3 < 1e-3 < strain.max()
     assert (fibre.tension(state.u)[strain < 0] < 0).all() == (not tension_only)
     assert fibre.nodes.shape[1] > 10  # some bars lie in two cells
+
+
+def test_derivatives_in_hexahedra():
+    mesh = tube_sector(1.0, 1.5, 1.0, 1, "hex27")
+    system = system_with(mesh, [[1.2, 0.1, 0.1], [0.9, 0.9, 0.5], [0.1, 1.2, 0.9]], [Clamped("z0")], bar_length=0.1)
+    assert check_derivatives(system.fibres[0], random_state(system, 0.02)) > 1e-2
 
 
 def test_the_lagged_force_is_the_linearised_one(octant):
@@ -170,3 +177,15 @@ def test_a_curve_that_leaves_the_body_is_refused_by_name_and_place(octant):
         system_with(octant, np.repeat(arc()[:2], 2, axis=0), [Clamped("x0")])
     with pytest.raises(InputError, match="no curve"):
         System(octant, {"body": neo_hookean()}, [Clamped("x0")], [], [Fibre("absent", 1.0, 1.0)])
+
+
+def test_a_plane_section_is_refused():
+    with pytest.raises(InputError, match="plane section"):
+        System(
+            rectangle((1.0, 1.0), (1, 1)),
+            {"body": neo_hookean()},
+            [Clamped("x0")],
+            [],
+            [Fibre("absent", 1.0, 1.0)],
+            PlaneStrain(),
+        )

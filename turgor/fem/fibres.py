@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
-from turgor.fem.elements import TET10
 from turgor.fem.kernels import parallel
 from turgor.fem.locate import locate
 from turgor.fem.state import State
@@ -76,14 +75,16 @@ class EmbeddedFibre:
     Raises
     ------
     InputError
-        If the mesh has no such curve, the curve leaves the body, or a property is not positive.
+        If the mesh is plane or has no such curve, the curve leaves the body, or a property is not positive.
     """
 
     def __init__(self, mesh: Mesh, fibre: Fibre) -> None:
+        if mesh.dimension != 3:
+            raise InputError("fibres need a body in space, not a plane section", key=f"fibres.{fibre.curve}")
         self.fibre = fibre
         self.ends = _bar_ends(mesh, fibre)
         cell, local = locate(mesh.points, mesh.cells, self.ends, f"curves.{fibre.curve}")
-        self.nodes, self._share = _end_differences(mesh.cells[cell], TET10.shape(local), mesh.n_points)
+        self.nodes, self._share = _end_differences(mesh.cells[cell], mesh.cell.shape(local), mesh.n_points)
         self._span = self._difference(mesh.points)
         self.length = np.linalg.norm(self._span, axis=1)
 
@@ -170,15 +171,15 @@ def _bar_ends(mesh: Mesh, fibre: Fibre) -> Floats:
 
 def _mean_edge(mesh: Mesh, curve: Floats, name: str) -> float:
     cell, _ = locate(mesh.points, mesh.cells, curve, f"curves.{name}")
-    corners = mesh.points[mesh.cells[np.unique(cell), :4]]
-    edges = [corners[:, a] - corners[:, b] for a, b in TET10.edges]
+    nodes = mesh.points[mesh.cells[np.unique(cell)]]
+    edges = [nodes[:, a] - nodes[:, b] for a, b in mesh.cell.edges]
     return float(np.linalg.norm(edges, axis=2).mean())
 
 
 def _end_differences(hosts: Ints, shape: Floats, n_points: int) -> tuple[Ints, Floats]:
     """Return, for each bar, the nodes that move its ends and each one's share in (second end − first end).
 
-    `hosts` ``(n_ends, 10)`` and `shape` ``(n_ends, 10)`` describe the ends. The results are ``(n_bars, width)``;
+    `hosts` and `shape` ``(n_ends, n_nodes)`` describe the ends. The results are ``(n_bars, width)``;
     bars with fewer nodes repeat one of them with share zero.
     """
     ends = sp.csr_matrix(
