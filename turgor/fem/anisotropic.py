@@ -159,6 +159,10 @@ class SpreadFibres:
         density, _, _ = self._law(self._strain(self._deformation(state.u)))
         return float(np.sum(density * self._dV))
 
+    def merit(self, state: State, lagged: Floats) -> float:
+        """Return the work of the lagged fibre stress, N mm."""
+        return 0.5 * float(np.sum(lagged * self._strain(self._deformation(state.u)) * self._dV))
+
     def force(self, state: State, out: Floats) -> None:
         """Add the fibres' forces, N."""
         F = self._deformation(state.u)
@@ -172,8 +176,9 @@ class SpreadFibres:
         _, _, second = self._law(self._strain(F))
         _fill_stiffness(F @ self._H, self._H, self._G, lagged * self._dV, 4.0 * second * self._dV, out)
 
-    def lagged_at(self, u: Floats) -> Floats:
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the fibre stress at displacement `u`, ``(m, q)``, MPa."""
+        del loads
         return self.stress(u)
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
