@@ -202,8 +202,10 @@ def _fits_of(
         if plain is not None:
             found.append(_judged(kind, problem, plain, stretch, volumetric, constrained=False))
     searched = sum(not constant.linear for constant in kind.constants())
-    # Linear models are constrained in no time; the two terms of Ogden's, which fit most rubbers, are worth a second.
-    quick = not searched or (issubclass(kind, OgdenModel) and searched <= 2)
+    # Limits do not move a single modulus: they do not depend on its size. Linear models are constrained in no time; the
+    # two terms of Ogden's, which fit most rubbers, are worth a second.
+    several = len(kind.constants()) - searched > 1
+    quick = several and (not searched or (issubclass(kind, OgdenModel) and searched <= 2))
     wanted = stability == "require" or (stability == "prefer" and quick and found and found[0].objections)
     if wanted:
         ratios = {} if biaxial_measured else PLAUSIBLE_RATIOS

@@ -22,7 +22,7 @@ from turgor.materials.measurement import MaterialTest
 STARTS_FOLLOWED = 10
 """So many of the best starts are followed to a minimum on the thinned tests (fewer where limits make that slow)."""
 
-STARTS_LIMITED = 3
+STARTS_LIMITED = 6
 
 MINIMA_POLISHED = 3
 """So many of the best minima are followed on all points."""
@@ -211,6 +211,9 @@ def _search(model: type[Hyperelastic], linear: _Linear) -> Array:
     chosen = [starts[i] for i in np.argsort(costs, kind="stable")[:followed]]
     minima = sorted((_descend(coarse, start, 1e-6, "2-point") for start in chosen), key=lambda found: float(found.cost))
     distinct = [m for i, m in enumerate(minima) if i == 0 or m.cost > minima[i - 1].cost * (1.0 + 1e-4)]
+    if linear.limits is not None:  # the limits make kinks, at which more digits are not to be had
+        ends = [_descend(linear, found.x, 1e-8, "2-point") for found in distinct[:MINIMA_POLISHED]]
+        return np.asarray(min(ends, key=lambda found: float(found.cost)).x, dtype=float)
     closer = [_descend(linear, found.x, 1e-9, "2-point") for found in distinct[:MINIMA_POLISHED]]
     best = min(closer, key=lambda found: float(found.cost))
     return np.asarray(_descend(linear, best.x, 1e-15, "3-point", 500).x, dtype=float)
