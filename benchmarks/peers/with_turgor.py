@@ -1,0 +1,47 @@
+"""Turgor: P2–P0, mean pressures condensed, mixed Newton in one load step, PARDISO on two threads.
+
+These are its defaults; nothing is set for this case.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from case_t import BULK, MU, PRESSURE, TOLERANCE, TubeMesh
+from measure import Solved, run
+
+import turgor
+from turgor.fem.loads import Pressure
+from turgor.fem.supports import Clamped
+from turgor.fem.system import System
+from turgor.materials.registry import create
+from turgor.mesh import Mesh
+from turgor.solver.linear import solver_in_use
+from turgor.solver.newton import NewtonOptions
+from turgor.solver.path import PathOptions, solve_path
+
+
+def solve(tube: TubeMesh) -> Solved:
+    mesh = Mesh(
+        points=tube.points,
+        cells=tube.cells,
+        regions={"body": np.arange(len(tube.cells), dtype=np.int32)},
+        surfaces={"mount": tube.mount, "cavity": tube.cavity},
+        markers={},
+        curves={},
+    )
+    rubber = create("neo-hookean", {"C10": f"{MU / 2} MPa"}, bulk_modulus=f"{BULK} MPa")
+    system = System(mesh, {"body": rubber}, [Clamped("mount")], [Pressure("cavity", PRESSURE)])
+    options = PathOptions(newton=NewtonOptions(tolerance=TOLERANCE))
+    (end,) = solve_path(system, [1.0], options=options)
+    return Solved(
+        tip=tuple(end.state.u[tube.tip].tolist()),
+        unknowns=system.n_dofs,
+        iterations=end.iterations,
+        factorisations=end.factorisations,
+        settings=f"P2–P0 mixed, condensed; 1 step; {solver_in_use().name}",
+        version=turgor.__version__,
+    )
+
+
+if __name__ == "__main__":
+    run(solve)
