@@ -28,8 +28,9 @@ MODELS = [
     "ogden-1", "ogden-2", "ogden-3", "gent", "arruda-boyce", "van-der-waals", "extended-tube",
 ]  # fmt: skip
 
-TOLERANCE = 1e-4
-"""FElupe shifts equal principal stretches apart before it differentiates, which moves its norms by some 1e-5."""
+TOLERANCE = 5e-4
+"""FElupe regularises its derivatives (equal stretches are shifted apart, the root of its van der Waals energy is kept
+off zero), which moves its norms by up to 2e-4 against the formulas: scipy's, of these, agree with Turgor's to 1e-8."""
 
 RANGES = {"0–300 %": (0.0, 3.0), "all": None}
 
