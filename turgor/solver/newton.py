@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from turgor.common.errors import SolverError
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.control import Control
 from turgor.solver.linear import LinearSolver, SingularMatrixError
 
 Floats = NDArray[np.float64]
@@ -111,9 +112,9 @@ def find_equilibrium(
     options: NewtonOptions,
     on_iteration: Callable[[int, float], None] | None = None,
     *,
-    conjugate: float | None = None,
+    control: Control | None = None,
 ) -> Equilibrium:
-    """Find the equilibrium at a load fraction, or at a given volume, from a guess.
+    """Find the equilibrium at a load fraction, or where a control cuts the path, from a guess.
 
     Each iteration solves with the tangent whose geometric part takes the pressures that the previous one predicted
     (``State.lagged``), while the right-hand side is the exact out-of-balance force. Eliminating the
@@ -127,15 +128,14 @@ def find_equilibrium(
     guess
         Where the iteration starts.
     fraction
-        The load fraction; with `conjugate`, only its first guess.
+        The load fraction; with `control`, only its first guess.
     options
         Tolerance and iteration limit.
     on_iteration
         Told the number of each iteration and the relative residual before it.
-    conjugate
-        If given, :meth:`System.conjugate` is brought to this value (for one cavity: its volume times its full
-        pressure) and the load fraction is an unknown: the bordered system of volume control, one factorisation and
-        two right-hand sides an iteration.
+    control
+        If given, the load fraction is an unknown, and this equation takes its place: a bordered system, one
+        factorisation and two right-hand sides an iteration.
 
     Raises
     ------
@@ -153,14 +153,13 @@ def find_equilibrium(
         force, scale = system.forces(state)
         residual = system.free_part(force)
         relative = float(np.linalg.norm(residual)) / max(scale, smallest)
-        gap = 0.0 if conjugate is None else conjugate - system.conjugate(state)
+        gap = 0.0 if control is None else _relative_gap(control, system.conjugate(state), fraction)
         residuals.append(relative)
         if on_iteration is not None:
             on_iteration(len(residuals) - 1, relative)
         if not np.isfinite(relative):
             raise _failure("the forces are not finite any more", system, state, residuals)
-        on_target = not moving and abs(gap) <= options.tolerance * abs(conjugate or 0.0)
-        if relative <= options.tolerance and on_target:
+        if max(relative, gap) <= options.tolerance and not moving:
             return _accepted(system, linear, state, fraction, residuals, compliance)
         if len(residuals) > options.max_iterations:
             raise _failure(f"no equilibrium within {options.max_iterations} iterations", system, state, residuals)
@@ -175,15 +174,21 @@ def find_equilibrium(
             du += pending
             moving = False
         change = 0.0
-        if conjugate is not None:
+        if control is not None:
             direction = system.load_direction(state)
             response = system.nodal(linear.solve(-system.free_part(direction)))
             compliance = -float(np.vdot(direction, response))
-            change = (gap + float(np.vdot(direction, du))) / compliance
+            value, by_conjugate, by_fraction = control.gap(system.conjugate(state), fraction)
+            value -= by_conjugate * float(np.vdot(direction, du))
+            change = -value / (by_conjugate * compliance + by_fraction)
             du += change * response
-        state, damping = _advanced(system, state, du, residuals, search=conjugate is None)
+        state, damping = _advanced(system, state, du, residuals, search=control is None)
         fraction += damping * change
         state = state.with_loads(system.loads_at(fraction))
+
+
+def _relative_gap(control: Control, conjugate: float, fraction: float) -> float:
+    return abs(control.gap(conjugate, fraction)[0]) / control.scale(conjugate)
 
 
 def factorise_tangent(system: System, linear: LinearSolver, state: State) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from turgor.common.log import logger
 from turgor.fem.system import System
+from turgor.solver.control import FixedConjugate
 from turgor.solver.linear import LinearSolver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
 
@@ -100,7 +101,8 @@ class VolumeWalk:
             if self.system.worst_jacobian(predicted.u)[0] > 0.0:
                 guess = predicted
                 fraction += reach * (here.fraction - before.fraction)
-        return find_equilibrium(self.system, self.linear, guess, fraction, self.options, conjugate=conjugate)
+        control = FixedConjugate(conjugate)
+        return find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between two equilibria of the walk whose compliances differ in sign.

@@ -1,0 +1,104 @@
+"""What is prescribed instead of the load: a volume, an amount of air, a distance along the path.
+
+Under each of these the load fraction f is an unknown. The equation that takes its place relates f to its conjugate Q
+(:meth:`turgor.fem.system.System.conjugate`; for one cavity its volume times its full pressure), so that every control
+is a curve in the plane of these two, and the path of equilibria is cut with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class Control(Protocol):
+    """A curve g(Q, f) = 0."""
+
+    def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
+        """Return g and its derivatives by Q and by f."""
+        ...
+
+    def scale(self, conjugate: float) -> float:
+        """Return what g is to be small against."""
+        ...
+
+
+@dataclass(frozen=True)
+class FixedConjugate:
+    """Q has a given value: volume control."""
+
+    target: float
+
+    def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
+        """Return Q − target."""
+        del fraction
+        return conjugate - self.target, 1.0, 0.0
+
+    def scale(self, conjugate: float) -> float:
+        """Return the target's size."""
+        del conjugate
+        return abs(self.target)
+
+
+@dataclass(frozen=True)
+class AirAmount:
+    """A closed amount of air at constant temperature: (p + p₀) V = n (Boyle), for one cavity.
+
+    Attributes
+    ----------
+    amount
+        n, the product of absolute pressure and volume, N mm.
+    full_pressure
+        Pressure of the cavity at load fraction one, MPa above the surroundings.
+    surroundings
+        p₀, MPa.
+    """
+
+    amount: float
+    full_pressure: float
+    surroundings: float = 0.101325
+
+    def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
+        """Return (p + p₀) V − n."""
+        volume = conjugate / self.full_pressure
+        absolute = fraction * self.full_pressure + self.surroundings
+        return absolute * volume - self.amount, absolute / self.full_pressure, conjugate
+
+    def scale(self, conjugate: float) -> float:
+        """Return the amount of air."""
+        del conjugate
+        return abs(self.amount)
+
+
+@dataclass(frozen=True)
+class ArcLength:
+    """A given distance from a point of the path, in the plane of Q and f (Riks 1979; Crisfield 1981).
+
+    It passes limits of the load and, other than volume control, places where the volume turns back.
+
+    Attributes
+    ----------
+    conjugate, fraction
+        The point.
+    conjugate_scale, fraction_scale
+        What counts as one along each axis.
+    length
+        The distance.
+    """
+
+    conjugate: float
+    fraction: float
+    conjugate_scale: float
+    fraction_scale: float
+    length: float
+
+    def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
+        """Return the squared distance less the squared length."""
+        x = (conjugate - self.conjugate) / self.conjugate_scale
+        y = (fraction - self.fraction) / self.fraction_scale
+        return x * x + y * y - self.length**2, 2 * x / self.conjugate_scale, 2 * y / self.fraction_scale
+
+    def scale(self, conjugate: float) -> float:
+        """Return the squared length."""
+        del conjugate
+        return self.length**2
