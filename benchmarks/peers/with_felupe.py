@@ -1,9 +1,10 @@
 """FElupe: `SolidBodyNearlyIncompressible` on quadratic tetrahedra, Newton in one load step, PARDISO (pypardiso).
 
 Its best settings of those tried. The nearly incompressible body keeps a mean pressure for each cell and condenses it,
-the same discretisation as Turgor's; its three-field form would solve a larger, indefinite matrix. The linear solver is pypardiso instead of SciPy's SuperLU, as FElupe's documentation advises, in symmetric mode,
-which halves the work of its default. Assembly has `parallel=True` and two threads. FElupe has no boundary region for
-tetrahedra; `CavityFaces` is one, built as FElupe's own regions are.
+the same discretisation as Turgor's; its three-field form would solve a larger, indefinite matrix. The linear solver is
+pypardiso instead of SciPy's SuperLU, as FElupe's documentation advises, in symmetric mode, which halves the work of its
+default. Assembly has `parallel=True` and two threads. FElupe has no boundary region for tetrahedra; `CavityFaces` is
+one, built as FElupe's own regions are.
 """
 
 from __future__ import annotations
