@@ -25,24 +25,40 @@ if TYPE_CHECKING:
     from turgor.mesh.files import write as write_mesh
     from turgor.mesh.mesh import Mesh
     from turgor.mesh.quality import quality as mesh_quality
-    from turgor.study.api import CappedTube, Model, PneuNet
+    from turgor.study.api import Model
     from turgor.study.case import Case, load_case
     from turgor.study.environment import environment
     from turgor.study.fitting import fit_document, write_fit_report, write_material
     from turgor.study.path import Path
     from turgor.study.run import Run, mesh_case, run
+    from turgor.study.shapes import (
+        Bellows,
+        CappedTube,
+        FibreTube,
+        Honeycomb,
+        Membrane,
+        PneuNet,
+        ReinforcedTube,
+        StepFile,
+    )
 
 __all__ = [
+    "Bellows",
     "CappedTube",
     "Case",
+    "FibreTube",
+    "Honeycomb",
     "InputError",
+    "Membrane",
     "Mesh",
     "MissingPackageError",
     "Model",
     "Path",
     "PneuNet",
+    "ReinforcedTube",
     "Run",
     "SolverError",
+    "StepFile",
     "TurgorError",
     "environment",
     "find_material",
@@ -71,12 +87,22 @@ _HOMES = {
     "turgor.mesh.files": ("write_mesh",),
     "turgor.mesh.mesh": ("Mesh",),
     "turgor.mesh.quality": ("mesh_quality",),
-    "turgor.study.api": ("CappedTube", "Model", "PneuNet"),
+    "turgor.study.api": ("Model",),
     "turgor.study.case": ("Case", "load_case"),
     "turgor.study.environment": ("environment",),
     "turgor.study.fitting": ("fit_document", "write_fit_report", "write_material"),
     "turgor.study.path": ("Path",),
     "turgor.study.run": ("Run", "mesh_case", "run"),
+    "turgor.study.shapes": (
+        "Bellows",
+        "CappedTube",
+        "FibreTube",
+        "Honeycomb",
+        "Membrane",
+        "PneuNet",
+        "ReinforcedTube",
+        "StepFile",
+    ),
 }
 """Module → the public names that it defines."""
 

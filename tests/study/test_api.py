@@ -71,10 +71,31 @@ def test_every_cavity_and_other_loads_act(mesh: tg.Mesh) -> None:
     assert set(heavy.records[-1].loads) == {"pressure:cavity", "gravity"}
 
 
-def test_contact_is_refused_with_its_reason(mesh: tg.Mesh) -> None:
-    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
-    with pytest.raises(InputError, match="contact is not part of this version"):
-        tg.Model(mesh, body=rubber, contact=True)
+def test_a_table_in_the_way_holds_the_tip_back(mesh: tg.Mesh, path: tg.Path) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    table = {"type": "plane", "point": ("0 mm", "0 mm", "40.2 mm"), "normal": (0, 0, -1), "surface": "tip-face"}
+    held = tg.Model(mesh, body=rubber, contact={"bodies": [table]}).inflate("20 kPa", steps=1)
+    free, stopped = (p.records[-1].displacement[mesh.marker("tip")][0, 2] for p in (path, held))
+    assert free > 0.4
+    assert stopped == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_body_that_touches_nothing_moves_as_without_contact(mesh: tg.Mesh, path: tg.Path) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    alone = tg.Model(mesh, body=rubber, contact=True).inflate("20 kPa", steps=1)
+    u = path.records[-1].displacement
+    np.testing.assert_allclose(alone.records[-1].displacement, u, atol=1e-6 * np.abs(u).max())
+
+
+def test_a_sheet_and_a_fibre_family_stiffen_the_tube(mesh: tg.Mesh, path: tg.Path) -> None:
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    paper = {"surface": "outer", "youngs_modulus": "10 MPa", "thickness": "0.1 mm"}
+    around = {"law": {"type": "quadratic", "k": "0.5 MPa"}, "direction": {"type": "helical", "angle": "90 deg"}}
+    volume = path.records[-1].cavity_volumes["cavity"]
+    for parts in ({"sheets": [paper]}, {"fibre_families": [around]}):
+        stiffer = tg.Model(mesh, body=rubber, **parts).inflate("20 kPa", steps=1)
+        assert stiffer.records[-1].cavity_volumes["cavity"] < 0.95 * volume
+    assert "sheets" in tg.Model(mesh, body=rubber, sheets=[paper]).inflate("1 kPa", steps=1).description
 
 
 def test_what_the_mesh_does_not_have_is_refused(mesh: tg.Mesh) -> None:
@@ -98,7 +119,7 @@ def test_regions_without_a_material_are_made_of_the_body() -> None:
     rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
     model = tg.Model(mesh, body=rubber)
     assert dict.fromkeys(mesh.regions, rubber) == model.materials
-    assert [held.surface for held in model.supports] == ["mount", "symmetry"]
+    assert [held.surface for held in model.setup.supports] == ["mount", "symmetry"]
 
 
 def test_a_path_beyond_the_limit_raises_with_facts(mesh: tg.Mesh) -> None:

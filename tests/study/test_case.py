@@ -10,11 +10,12 @@ import pytest
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.materials import create
-from turgor.study.boundary import read_loads, read_supports
 from turgor.study.build import check_sizes
 from turgor.study.case import Case, load_case
 from turgor.study.materials import build_materials
+from turgor.study.setup import Setup
 
+HELD = [{"type": "clamped", "surface": "mount"}]
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 
 
@@ -45,6 +46,7 @@ geometry: {template: tube, wall: 0.1 in, cap: 0.7 inch}
 materials:
   body: {model: ogden-2, constants: {mu1: 9.11e-4 MPa, alpha1: 5.88, mu2: 9.79 psi, alpha2: 1.45},
          D1: 3e-2 1/kPa, density: 1.07 g/cm^3, convention: abaqus}
+mesh: {size: 0.1 in, sizes: {outer: 0.07 in}, per_circle: 16}
 supports:
   - {type: displacement, surface: mount, x: 0 mm, y: 1 thou}
   - {type: elastic, surface: outer, stiffness: 0.1 kPa/mm, normal_only: true}
@@ -53,6 +55,24 @@ loads:
   - {type: gravity, direction: [1, 2, 3]}
   - {type: traction, surface: tip-face, value: 0.3 kPa, direction: [0, 1, 1]}
   - {type: force, surface: tip-face, value: 0.1 gram_force, direction: [0, 0, -2]}
+contact:
+  self: true
+  pairs: [[outer, tip-face]]
+  bodies:
+    - {type: plane, point: [0 mm, 0 mm, 1 ft], normal: [0, 0, -1], surface: tip-face, move: [0 mm, 1 in, -0.1 in]}
+    - {type: box, lower: [0 cm, 0 cm, 20 cm], upper: [1 in, 1 in, 1 ft]}
+    - {type: cylinder, start: [0 mm, 9 cm, 0 mm], end: [0 mm, 9 cm, 1 cm], radius: 0.1 in, name: bar}
+    - {type: sphere, centre: [9 cm, 0 mm, 0 mm], radius: 0.3 in}
+fibres:
+  - {youngs_modulus: 4506 ksi, diameter: 7 thou}
+  - {curve: fibre-1, youngs_modulus: 31 GPa, diameter: 0.1 mm, tension_only: false, bar_length: 0.1 in}
+sheets:
+  - {surface: outer, youngs_modulus: 1 GPa, thickness: 4 thou, poisson: 0.25}
+  - {between: [body, base], youngs_modulus: 1 GPa, thickness: 4 thou}
+fibre_families:
+  - law: {type: exponential, k1: 7 psi, k2: 0.1}
+    direction: {type: helical, angle: 54.7356 deg, axis: [0, 1, 0], origin: [0.1 in, 0 mm, 0 mm]}
+  - {law: {type: quadratic, k: 0.1 psi}, direction: {type: constant, vector: [1, 2, 0]}, dispersion: 0.1}
 solver: {outputs: [0.1 psi, 0.7 psi, 1.1 psi]}
 measures: [twist]
 """
@@ -78,17 +98,18 @@ def test_outputs_are_fractions_of_the_pressure(small_tube: Path) -> None:
 
 
 def test_direction_and_size_make_a_vector() -> None:
-    (gravity,) = read_loads([{"type": "gravity", "direction": [0, 3, -4]}])
+    (gravity,) = Setup.read(supports=HELD, loads=[{"type": "gravity", "direction": [0, 3, -4]}]).loads
     assert gravity.build().acceleration == pytest.approx((0.0, 0.6 * 9806.65, -0.8 * 9806.65))
-    (force,) = read_loads([{"type": "force", "surface": "tip-face", "value": "2 N", "direction": [0, 0, 5]}])
+    pull = {"type": "force", "surface": "tip-face", "value": "2 N", "direction": [0, 0, 5]}
+    (force,) = Setup.read(supports=HELD, loads=[pull]).loads
     assert force.build().vector == (0.0, 0.0, 2.0)
 
 
 def test_items_of_the_python_story_are_checked_as_in_a_file() -> None:
     with pytest.raises(InputError, match=r"supports.0.surfac: unknown key; expected 'surface'"):
-        read_supports([{"type": "clamped", "surfac": "mount"}])
+        Setup.read(supports=[{"type": "clamped", "surfac": "mount"}])
     with pytest.raises(InputError, match=r"loads.0.value: a unit is missing"):
-        read_loads([{"type": "pressure", "value": 3}])
+        Setup.read(supports=HELD, loads=[{"type": "pressure", "value": 3}])
 
 
 def test_materials_take_their_volume_change_and_density(small_tube: Path) -> None:

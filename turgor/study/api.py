@@ -1,4 +1,4 @@
-"""The Python story: fit a rubber, draw an actuator, mesh it, inflate it, look at the path."""
+"""The Python story: a meshed actuator with its materials becomes a model, and the model is inflated."""
 
 from __future__ import annotations
 
@@ -8,52 +8,14 @@ from typing import Any
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.fem.loads import Pressure
-from turgor.fem.system import System
-from turgor.geometry import pneunet, tube
-from turgor.geometry.actuator import Actuator
 from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
-from turgor.mesh.generate import generate
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions, solve_path
-from turgor.study.boundary import read_loads, read_supports
 from turgor.study.build import every_region
 from turgor.study.path import Path
+from turgor.study.setup import Setup, cavities_of
 from turgor.study.states import Recorder
-
-
-class _Meshed(Actuator):
-    """What the Python story adds to a template: the way to its mesh."""
-
-    def mesh(self, size: str | None = None) -> Mesh:
-        """Mesh the actuator with elements of `size` (text with a unit; left out, the template's own default).
-
-        Raises
-        ------
-        InputError
-            If the size is no positive length, or gmsh finds no valid mesh.
-        """
-        return generate(self, None if size is None else to_internal(size, "length", key="size"))
-
-
-class CappedTube(tube.CappedTube, _Meshed):
-    """The capped tube; ``CappedTube(length="90 mm").mesh(size="3 mm")``, `turgor templates tube` lists the parameters.
-
-    Raises
-    ------
-    InputError
-        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
-    """
-
-
-class PneuNet(pneunet.PneuNet, _Meshed):
-    """The PneuNet finger; ``PneuNet(chambers=8, wall="1.5 mm")``, `turgor templates pneunet` lists the parameters.
-
-    Raises
-    ------
-    InputError
-        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
-    """
 
 
 class Model:
@@ -69,15 +31,17 @@ class Model:
     loads
         What acts on it besides the pressure, each as in a case file: ``{"type": "gravity"}``.
     contact
-        Contact of the actuator with itself.
+        ``True`` for contact of the actuator with itself; or what may touch what, as in a case file:
+        ``{"bodies": [{"type": "plane", "point": …, "normal": …}]}``.
+    fibres, sheets, fibre_families
+        What runs through the body or lies on it, each as in a case file.
     materials
         One for each region by its name; regions without one are made of the material of ``body``.
 
     Raises
     ------
     InputError
-        If a region, surface or cavity is unknown, a region has no material, or `contact` is asked for, which this
-        version does not have.
+        If a region, surface, cavity or curve is unknown, or a region has no material.
     """
 
     def __init__(
@@ -86,20 +50,23 @@ class Model:
         *,
         supports: Sequence[Mapping[str, Any]] | None = None,
         loads: Sequence[Mapping[str, Any]] = (),
-        contact: bool = False,
+        contact: bool | Mapping[str, Any] = False,
+        fibres: Sequence[Mapping[str, Any]] = (),
+        sheets: Sequence[Mapping[str, Any]] = (),
+        fibre_families: Sequence[Mapping[str, Any]] = (),
         **materials: Hyperelastic,
     ) -> None:
-        if contact:
-            raise InputError(
-                "contact is not part of this version: the walls may pass through each other",
-                key="contact",
-                value=True,
-                expected="contact=False",
-            )
         self.mesh = mesh
         self.materials = every_region(materials, mesh)
-        self.supports = read_supports(_default_supports(mesh) if supports is None else supports)
-        self.loads = read_loads(loads)
+        self.setup = Setup.read(
+            supports=_default_supports(mesh) if supports is None else supports,
+            loads=loads,
+            contact=contact,
+            fibres=fibres,
+            sheets=sheets,
+            fibre_families=fibre_families,
+        )
+        self.setup.check(mesh)
 
     def inflate(
         self,
@@ -138,8 +105,7 @@ class Model:
         value = to_internal(pressure, "pressure", key="pressure")
         cavities = [cavity] if cavity else _cavities(self.mesh)
         pressures = [Pressure(name, value) for name in cavities]
-        others = [load.build() for load in self.loads]
-        system = System(self.mesh, self.materials, [held.build() for held in self.supports], [*pressures, *others])
+        system = self.setup.system(self.mesh, self.materials, pressures)
         recorder = Recorder(system)
         path = Path(self.mesh, system.n_dofs, self._description())
 
@@ -158,8 +124,7 @@ class Model:
                 region: {"model": rubber.name, "constants": rubber.parameters, "bulk_modulus_MPa": rubber.bulk_modulus}
                 for region, rubber in self.materials.items()
             },
-            "supports": [held.model_dump(mode="json", exclude_none=True) for held in self.supports],
-            "loads": [load.model_dump(mode="json", exclude_none=True) for load in self.loads],
+            **self.setup.model_dump(mode="json", exclude_none=True),
         }
 
 
@@ -169,7 +134,7 @@ def _default_supports(mesh: Mesh) -> list[dict[str, str]]:
 
 
 def _cavities(mesh: Mesh) -> list[str]:
-    names = [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
+    names = cavities_of(mesh)
     if not names:
         raise InputError("the mesh has no cavity to inflate", key="cavity", expected="a surface called 'cavity'")
     return names

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from turgor.common.units import Acceleration, Force, Foundation, Length, Pressure
 from turgor.fem.loads import Force as SurfaceForce
 from turgor.fem.loads import Gravity, Traction
 from turgor.fem.loads import Pressure as CavityPressure
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
-from turgor.study.validation import StrictModel, explain, invalid, under
+from turgor.study.validation import StrictModel, invalid
 
 Vector = tuple[float, float, float]
 
@@ -135,27 +134,6 @@ class ForceCase(StrictModel):
 
 Support = Annotated[ClampedCase | SlidingCase | DisplacementCase | ElasticCase, Field(discriminator="type")]
 Load = Annotated[PressureCase | GravityCase | TractionCase | ForceCase, Field(discriminator="type")]
-
-_SUPPORTS: TypeAdapter[tuple[Support, ...]] = TypeAdapter(tuple[Support, ...])
-_LOADS: TypeAdapter[tuple[Load, ...]] = TypeAdapter(tuple[Load, ...])
-
-
-def read_supports(items: Sequence[Mapping[str, Any]]) -> tuple[Support, ...]:
-    """Return supports given as in a case file; raise InputError as a case file does."""
-    data = [dict(item) for item in items]
-    try:
-        return _SUPPORTS.validate_python(data)
-    except ValidationError as error:
-        raise under(explain(error, data), "supports") from None
-
-
-def read_loads(items: Sequence[Mapping[str, Any]]) -> tuple[Load, ...]:
-    """Return loads given as in a case file; raise InputError as a case file does."""
-    data = [dict(item) for item in items]
-    try:
-        return _LOADS.validate_python(data)
-    except ValidationError as error:
-        raise under(explain(error, data), "loads") from None
 
 
 def _along(direction: Vector, size: float) -> Vector:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_text
@@ -11,7 +11,7 @@ from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
 from turgor.study.boundary import GravityCase, PressureCase, TractionCase
 from turgor.study.case import Case
-from turgor.study.validation import suggestion
+from turgor.study.setup import check_name
 
 ATMOSPHERE = 0.101325
 """MPa; a pressure below its negative is no vacuum but an impossibility."""
@@ -48,13 +48,15 @@ def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
                 expected="a density with its unit, such as '1070 kg/m^3'",
             )
     coarsest = case.geometry.default_size
-    if case.mesh.size is not None and case.mesh.size < coarsest / MOST_ELEMENTS_PER_WALL:
-        raise InputError(
-            f"this is more than {MOST_ELEMENTS_PER_WALL} elements through the thinnest wall",
-            key="mesh.size",
-            value=to_text(case.mesh.size, "length"),
-            expected=f"about {coarsest:g} mm, and not below {coarsest / MOST_ELEMENTS_PER_WALL:g} mm",
-        )
+    sizes = {"size": case.mesh.size, **{f"sizes.{name}": size for name, size in case.mesh.sizes.items()}}
+    for key, size in sizes.items():
+        if size is not None and size < coarsest / MOST_ELEMENTS_PER_WALL:
+            raise InputError(
+                f"this is more than {MOST_ELEMENTS_PER_WALL} elements through the thinnest wall",
+                key=f"mesh.{key}",
+                value=to_text(size, "length"),
+                expected=f"about {coarsest:g} mm, and not below {coarsest / MOST_ELEMENTS_PER_WALL:g} mm",
+            )
     stiffest = max(material.shear_modulus for material in materials.values())
     for number, load in enumerate(case.loads):
         key = f"loads.{number}.value"
@@ -88,7 +90,7 @@ def every_region(materials: Mapping[str, Hyperelastic], mesh: Mesh) -> dict[str,
 
 
 def check_names(case: Case, mesh: Mesh) -> None:
-    """Refuse a region, surface or cavity that the mesh does not have.
+    """Refuse a region, surface, cavity or curve that the mesh does not have.
 
     Raises
     ------
@@ -96,35 +98,17 @@ def check_names(case: Case, mesh: Mesh) -> None:
         With the key and the names that there are.
     """
     _check_regions(case.materials, mesh)
-    for number, support in enumerate(case.supports):
-        _check_name(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
-    cavities = [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
-    for number, load in enumerate(case.loads):
-        if isinstance(load, PressureCase):
-            _check_name(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
-        elif not isinstance(load, GravityCase):
-            _check_name(load.surface, mesh.surfaces, f"loads.{number}.surface", "surface")
+    case.check(mesh)
 
 
 def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> System:
     """Return the system of a case on its mesh; raise InputError as `every_region`, `check_names` or System do."""
-    check_names(case, mesh)
-    return System(
-        mesh,
-        every_region(materials, mesh),
-        supports=[support.build() for support in case.supports],
-        loads=[load.build() for load in case.loads],
-    )
+    return case.system(mesh, every_region(materials, mesh))
 
 
 def _check_regions(names: Collection[str], mesh: Mesh) -> None:
     for name in names:
-        _check_name(name, mesh.regions, f"materials.{name}", "region")
+        check_name(name, mesh.regions, f"materials.{name}", "region")
     for region in mesh.regions:
         if region not in names and "body" not in names:
             raise InputError(f"no material is given for the region '{region}'", key=f"materials.{region}")
-
-
-def _check_name(name: str, known: Iterable[str], key: str, kind: str) -> None:
-    if name not in known:
-        raise InputError(f"the actuator has no such {kind}", key=key, value=name, expected=suggestion(name, known))

@@ -18,6 +18,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     PlainSerializer,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -28,22 +29,31 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength, Pressure
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import templates
+from turgor.geometry.imported.step import StepFile
 from turgor.results.measures import MEASURES
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
-from turgor.study.boundary import Load, PressureCase, Support
-from turgor.study.materials import FittedMaterial, MaterialChoice
+from turgor.study.boundary import Load, PressureCase
+from turgor.study.materials import FittedMaterial, MaterialChoice, in_case_folder
 from turgor.study.reading import override, read_mapping
+from turgor.study.setup import Setup
 from turgor.study.validation import StrictModel, explain, invalid, suggestion, under
 
 
-def _actuator(value: object) -> object:
+def _known() -> dict[str, type[Actuator]]:
+    """Return every kind of shape by the name that it has in a case file."""
+    return {**templates(), StepFile.template: StepFile}
+
+
+def _actuator(value: object, info: ValidationInfo) -> object:
     """Read ``{template: name, …its parameters}``; a template that is already built passes."""
     if not isinstance(value, dict):
         return value
     parameters = dict(value)
     name = parameters.pop("template", None)
-    known = templates()
+    known = _known()
+    if name == StepFile.template and "file" in parameters:
+        parameters["file"] = str(in_case_folder(parameters["file"], info, "STEP", "file"))
     if not isinstance(name, str) or name not in known:
         problem = "this key is missing" if name is None else "unknown template"
         raise InputError(problem, key="geometry.template", value=name, expected=suggestion(str(name), known))
@@ -57,14 +67,26 @@ def _template_and_parameters(actuator: Actuator) -> dict[str, Any]:
     return {"template": actuator.template, **actuator.model_dump(mode="json")}
 
 
+def _inlined(schema: Any, parts: Mapping[str, Any]) -> Any:
+    """Return a JSON Schema with each reference replaced by the part that it names; no part may hold itself."""
+    if isinstance(schema, list):
+        return [_inlined(item, parts) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    rest = {key: _inlined(value, parts) for key, value in schema.items() if key != "$ref"}
+    return {**_inlined(parts[schema["$ref"].rsplit("/", 1)[1]], parts), **rest} if "$ref" in schema else rest
+
+
 class _GeometrySchema:
     """JSON Schema of the geometry: one alternative a template, so that an editor completes its parameters."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         alternatives = []
-        for name, template in templates().items():
+        for name, template in _known().items():
             schema = template.model_json_schema()
+            # What pydantic refers to from here it would look for in the schema of the whole case.
+            schema = _inlined(schema, schema.pop("$defs", {}))
             schema["properties"] = {"template": {"const": name}, **schema["properties"]}
             schema["required"] = ["template", *schema.get("required", [])]
             alternatives.append(schema)
@@ -75,9 +97,13 @@ Geometry = Annotated[Actuator, BeforeValidator(_actuator), PlainSerializer(_temp
 
 
 class MeshCase(StrictModel):
-    """How finely the actuator is cut into tetrahedra."""
+    """How finely the actuator is cut into elements."""
 
     size: PositiveLength | None = Field(default=None, description="edge length; left out, the template's own default")
+    sizes: dict[str, PositiveLength] = Field(default={}, description="region or surface: smaller edge length there")
+    per_circle: int | None = Field(
+        default=None, strict=True, ge=0, le=1000, description="elements along a full circle, at least"
+    )
 
 
 Count = Annotated[int, Field(strict=True, ge=1)]
@@ -108,7 +134,7 @@ class SolverCase(StrictModel):
         return self
 
 
-class Case(StrictModel):
+class Case(Setup):
     """One study of one actuator: what it is made of, how it is held and loaded, and what is to be known of it.
 
     Made from a file by :func:`load_case`. Quantities are kept in internal units and written back with them.
@@ -118,7 +144,6 @@ class Case(StrictModel):
     geometry: Geometry
     materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
     mesh: MeshCase = MeshCase()
-    supports: tuple[Support, ...] = Field(min_length=1)
     loads: tuple[Load, ...] = Field(min_length=1)
     solver: SolverCase = SolverCase()
     measures: tuple[str, ...] | None = Field(default=None, description="left out, all that the actuator's names allow")
@@ -182,13 +207,19 @@ class Case(StrictModel):
             Data file → the path to write for it, relative to the folder the YAML will lie in.
         """
         data = self.model_dump(mode="json", exclude_none=True)
+        if isinstance(self.geometry, StepFile):
+            path = Path(self.geometry.file)
+            data["geometry"]["file"] = (files or {}).get(path, str(path))
         for region, material in self.materials.items():
             if isinstance(material, FittedMaterial):
                 data["materials"][region]["fit"] = [(files or {}).get(path, str(path)) for path in material.fit]
+        data = {key: data[key] for key in _FIRST} | {key: part for key, part in data.items() if part not in ([], {})}
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
 
 
 DEFAULT_STEPS = 10
+_FIRST = ("name", "geometry", "materials", "mesh")
+"""What a reader of the resolved case looks for first."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 

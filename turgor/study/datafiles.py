@@ -1,10 +1,11 @@
-"""Copies of a case's test data in its run's folder, so that the resolved ``case.yaml`` runs again anywhere."""
+"""Copies of the files that a case names in its run's folder, so that the resolved ``case.yaml`` runs again anywhere."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
 
+from turgor.geometry.imported.step import StepFile
 from turgor.study.case import Case
 from turgor.study.materials import FittedMaterial
 
@@ -14,6 +15,8 @@ FOLDER = "data"
 def data_names(case: Case) -> dict[Path, str]:
     """Return each data file of the case and the name of its copy, relative to the run's folder."""
     paths = [path for choice in case.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit]
+    if isinstance(case.geometry, StepFile):
+        paths.append(Path(case.geometry.file))
     names: dict[Path, str] = {}
     for path in dict.fromkeys(paths):
         name = f"{FOLDER}/{path.name}"

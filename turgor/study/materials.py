@@ -21,16 +21,21 @@ from turgor.study.validation import StrictModel, collected, invalid, under
 log = logger("study")
 
 
-def _in_case_folder(value: object, info: ValidationInfo) -> object:
-    """Read a path relative to the case file's folder and make sure that the file is there."""
+def in_case_folder(value: object, info: ValidationInfo, kind: str = "CSV", key: str | None = None) -> Path:
+    """Read a path relative to the case file's folder and make sure that the file, of some `kind`, is there."""
     if not isinstance(value, (str, Path)) or not str(value):
-        raise invalid("this is not a file name", value=value, expected="the path of a CSV file")
+        raise invalid("this is not a file name", key=key, value=value, expected=f"the path of a {kind} file")
     folder = (info.context or {}).get("folder", Path())
     path: Path = folder / Path(value).expanduser()
     if not path.is_file():
         problem = "this is a folder" if path.is_dir() else "there is no such file"
-        raise invalid(problem, value=str(value), expected="a CSV file, its path relative to the case file")
+        expected = f"a {kind} file, its path relative to the case file"
+        raise invalid(problem, key=key, value=str(value), expected=expected)
     return path
+
+
+def _test_file(value: object, info: ValidationInfo) -> Path:
+    return in_case_folder(value, info)
 
 
 def _as_list(value: object) -> object:
@@ -58,7 +63,7 @@ ALL = "all"
 
 ModelName = Annotated[str, AfterValidator(_known_model)]
 StrainRange = Annotated[str, AfterValidator(_strain_range)]
-DataFile = Annotated[Path, BeforeValidator(_in_case_folder)]
+DataFile = Annotated[Path, BeforeValidator(_test_file)]
 
 
 class _Compressible(StrictModel):

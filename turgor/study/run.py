@@ -24,7 +24,7 @@ from turgor.results.summary import Summary, summarise
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import solve_path
 from turgor.study.build import check_names, check_sizes, system_of
-from turgor.study.case import Case
+from turgor.study.case import Case, MeshCase
 from turgor.study.datafiles import copy_data, data_names, same_data
 from turgor.study.fitting import fit_document
 from turgor.study.machine import peak_memory_mb
@@ -32,6 +32,7 @@ from turgor.study.materials import FittedMaterial, build_materials
 from turgor.study.progress import Progress, Silent
 from turgor.study.runlog import RunLog
 from turgor.study.states import Recorder, to_equilibrium
+from turgor.study.validation import under
 
 log = logger("study")
 
@@ -111,7 +112,12 @@ def mesh_case(case: Case) -> Mesh:
     InputError
         If there is no valid mesh, or a region, surface or cavity of the case is not on it.
     """
-    mesh = generate(case.geometry, case.mesh.size)
+    how = case.mesh
+    try:
+        mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle)
+    except InputError as error:
+        about_size = error.key is not None and error.key.split(".")[0] in MeshCase.model_fields
+        raise under(error, "mesh") if about_size else error from error
     check_names(case, mesh)
     return mesh
 

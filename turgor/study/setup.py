@@ -1,0 +1,125 @@
+"""What holds a body, acts on it, touches it and reinforces it: the part that cases and the Python story share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Self
+
+from pydantic import Field, ValidationError
+
+from turgor.common.errors import InputError
+from turgor.fem import loads as fem_loads
+from turgor.fem.system import Reinforcement, System
+from turgor.materials import Hyperelastic
+from turgor.mesh import Mesh
+from turgor.study.boundary import GravityCase, Load, PressureCase, Support
+from turgor.study.contact import ContactChoice
+from turgor.study.reinforcement import FibreCase, FibreFamilyCase, SheetCase
+from turgor.study.validation import StrictModel, explain, suggestion
+
+
+class Setup(StrictModel):
+    """The supports, loads, contact and reinforcements of a body."""
+
+    supports: tuple[Support, ...] = Field(min_length=1)
+    loads: tuple[Load, ...] = ()
+    contact: ContactChoice = Field(default=None, description="left out, nothing touches anything")
+    fibres: tuple[FibreCase, ...] = ()
+    sheets: tuple[SheetCase, ...] = ()
+    fibre_families: tuple[FibreFamilyCase, ...] = ()
+
+    @classmethod
+    def read(cls, **parts: Any) -> Self:
+        """Return the setup of parts given as in a case file; raise InputError as a case file does."""
+        data = {key: _plain(part) for key, part in parts.items()}
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise explain(error, data) from None
+
+    def check(self, mesh: Mesh) -> None:
+        """Refuse a surface, cavity, region or curve that the mesh does not have.
+
+        Raises
+        ------
+        InputError
+            With the key and the names that there are.
+        """
+        for number, support in enumerate(self.supports):
+            check_name(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
+        cavities = cavities_of(mesh)
+        for number, load in enumerate(self.loads):
+            if isinstance(load, PressureCase):
+                check_name(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
+            elif not isinstance(load, GravityCase):
+                check_name(load.surface, mesh.surfaces, f"loads.{number}.surface", "surface")
+        self._check_contact(mesh)
+        self._check_reinforcements(mesh)
+
+    def system(
+        self, mesh: Mesh, materials: Mapping[str, Hyperelastic], pressures: Sequence[fem_loads.Pressure] = ()
+    ) -> System:
+        """Return the system on a mesh with a material for each region, and with `pressures` before the other loads.
+
+        Raises
+        ------
+        InputError
+            As :meth:`check` and :class:`System` do.
+        """
+        self.check(mesh)
+        return System(
+            mesh,
+            materials,
+            supports=[support.build() for support in self.supports],
+            loads=[*pressures, *(load.build() for load in self.loads)],
+            reinforcements=self._reinforcements(mesh),
+            contact=self.contact.build() if self.contact else [],
+        )
+
+    def _reinforcements(self, mesh: Mesh) -> list[Reinforcement]:
+        threads = [fibre for choice in self.fibres for fibre in choice.build(mesh)]
+        sheets = [sheet.build() for sheet in self.sheets]
+        return [*threads, *sheets, *(family.build() for family in self.fibre_families)]
+
+    def _check_contact(self, mesh: Mesh) -> None:
+        if self.contact is None:
+            return
+        for number, names in enumerate(self.contact.pairs):
+            for side, name in enumerate(names):
+                check_name(name, mesh.surfaces, f"contact.pairs.{number}.{side}", "surface")
+        for number, body in enumerate(self.contact.bodies):
+            if body.surface is not None:
+                check_name(body.surface, mesh.surfaces, f"contact.bodies.{number}.surface", "surface")
+
+    def _check_reinforcements(self, mesh: Mesh) -> None:
+        for number, fibre in enumerate(self.fibres):
+            key = f"fibres.{number}.curve"
+            if not mesh.curves:
+                raise InputError("the actuator has no curves for fibres to run along", key=key, expected="no fibres")
+            if fibre.curve is not None:
+                check_name(fibre.curve, mesh.curves, key, "curve")
+        for number, sheet in enumerate(self.sheets):
+            if sheet.surface is not None:
+                check_name(sheet.surface, mesh.surfaces, f"sheets.{number}.surface", "surface")
+            for side, region in enumerate(sheet.between or ()):
+                check_name(region, mesh.regions, f"sheets.{number}.between.{side}", "region")
+        for number, family in enumerate(self.fibre_families):
+            check_name(family.region, mesh.regions, f"fibre_families.{number}.region", "region")
+
+
+def cavities_of(mesh: Mesh) -> list[str]:
+    """Return the names of the surfaces that are cavities."""
+    return [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
+
+
+def check_name(name: str, known: Iterable[str], key: str, kind: str) -> None:
+    """Refuse a name that is not among the `known` ones of its `kind`."""
+    if name not in known:
+        raise InputError(f"the actuator has no such {kind}", key=key, value=name, expected=suggestion(name, known))
+
+
+def _plain(part: Any) -> Any:
+    """Return lists and mappings as YAML would give them."""
+    if isinstance(part, Mapping):
+        return {key: _plain(value) for key, value in part.items()}
+    return [_plain(item) for item in part] if isinstance(part, (list, tuple)) else part

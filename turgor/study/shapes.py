@@ -1,0 +1,119 @@
+"""The actuator templates of the Python story: what the geometry draws, with the way to its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from turgor.common.units import to_internal
+from turgor.geometry import bellows, fibre_tube, honeycomb, membrane, pneunet, reinforced_tube, tube
+from turgor.geometry.actuator import Actuator
+from turgor.geometry.imported import step
+from turgor.mesh import Mesh
+from turgor.mesh.generate import generate
+
+
+class _Meshed(Actuator):
+    """What the Python story adds to a template: the way to its mesh."""
+
+    def mesh(
+        self, size: str | None = None, *, sizes: Mapping[str, str] | None = None, per_circle: int | None = None
+    ) -> Mesh:
+        """Mesh the actuator.
+
+        Parameters
+        ----------
+        size
+            Edge length of the elements, text with a unit; left out, the template's own default.
+        sizes
+            Smaller edge lengths by the name of a region or surface.
+        per_circle
+            Elements along a full circle, at least; left out, the template's own default.
+
+        Raises
+        ------
+        InputError
+            If a size is no positive length or names nothing, or gmsh finds no valid mesh.
+        """
+        local = {name: to_internal(text, "length", key=f"sizes.{name}") for name, text in (sizes or {}).items()}
+        whole = None if size is None else to_internal(size, "length", key="size")
+        return generate(self, whole, sizes=local, per_circle=per_circle)
+
+
+class Bellows(bellows.Bellows, _Meshed):
+    """The bellows; ``Bellows(convolutions=3, wall="1.23 mm")``, `turgor templates bellows` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class CappedTube(tube.CappedTube, _Meshed):
+    """The capped tube; ``CappedTube(length="90 mm").mesh(size="3 mm")``, `turgor templates tube` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class FibreTube(fibre_tube.FibreTube, _Meshed):
+    """The fibre tube; ``FibreTube(tilt="51 deg")``, `turgor templates fibre-tube` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class Honeycomb(honeycomb.Honeycomb, _Meshed):
+    """The honeycomb network; ``Honeycomb(columns=3, rows=3)``, `turgor templates honeycomb` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class Membrane(membrane.Membrane, _Meshed):
+    """The membrane actuator; ``Membrane(segments=1)``, `turgor templates membrane` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class PneuNet(pneunet.PneuNet, _Meshed):
+    """The PneuNet finger; ``PneuNet(chambers=8, wall="1.5 mm")``, `turgor templates pneunet` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class ReinforcedTube(reinforced_tube.ReinforcedTube, _Meshed):
+    """The reinforced tube; ``ReinforcedTube(rings=20)``, `turgor templates reinforced-tube` lists the parameters.
+
+    Raises
+    ------
+    InputError
+        On construction, if a parameter is unknown, has a wrong unit, is out of bounds or contradicts another.
+    """
+
+
+class StepFile(step.StepFile, _Meshed):
+    """A solid or an assembly from a STEP file; ``StepFile(file="gripper.step", mount={"normal": (0, 0, -1)})``.
+
+    Raises
+    ------
+    InputError
+        On construction, if there is no such file or a rule is not well formed; on meshing, if a rule selects no face.
+    """
