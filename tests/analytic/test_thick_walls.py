@@ -140,6 +140,18 @@ def test_rates(name, kind):
     assert order - 1.07 < rates[1] < order + 0.3, rates
 
 
+@pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[1] != "tet10"])
+def test_incompressibility_costs_no_iterations(name, kind):
+    body, counts = BODIES[name], []
+    for ratio in (1.0, 1e2, 1e5):
+        loads = [Pressure("inner", 0.6 * body.pressure(1.5))]
+        mesh = body.mesh(1, kind)
+        system = System(mesh, {"body": neo_hookean(MU, ratio)}, body.supports, loads, section=body.section)
+        counts.append(solve_path(system, [1.0])[0].iterations)
+    assert max(counts) - min(counts) <= 2
+    assert max(counts) <= 7
+
+
 def test_limit_of_the_sphere_lies_where_it_should():
     stretches = np.linspace(1.3, 2.0, 2001)
     pressures = np.array([sphere_pressure(s) for s in stretches])

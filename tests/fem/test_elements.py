@@ -8,7 +8,7 @@ from samples import neo_hookean, random_state, shifted
 
 from turgor.common.errors import InputError
 from turgor.fem.elements import pressure_modes
-from turgor.fem.fields import von_mises
+from turgor.fem.fields import _extrapolation, von_mises
 from turgor.fem.frames import block_products
 from turgor.fem.loads import Force, Gravity, Pressure, Traction
 from turgor.fem.pattern import packed_size
@@ -18,6 +18,7 @@ from turgor.fem.system import System
 from turgor.materials.models.mooney_rivlin import MooneyRivlin2
 from turgor.materials.models.ogden import Ogden2
 from turgor.materials.volumetric import Logarithmic, Quadratic
+from turgor.mesh.cells import CELLS
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, quarter_ring, rectangle, shell_octant
 from turgor.solver.path import solve_path
@@ -206,7 +207,14 @@ def test_pressure_modes_are_orthonormal_and_contain_the_linear_functions():
         np.testing.assert_allclose(projected, linear, atol=1e-12)
 
 
-def test_pressure_pushes_a_free_sheet_as_it_does_a_bar():
+def test_a_linear_stress_is_continued_to_the_nodes():
+    for cell in CELLS.values():
+        if cell.dimension > 1:
+            slope = np.arange(1.0, 1.0 + cell.dimension)
+            np.testing.assert_allclose(_extrapolation(cell) @ (cell.points @ slope), cell.nodes @ slope, atol=1e-13)
+
+
+def test_a_free_sheet_stretches_as_a_bar():
     # Plane stress: stretching by λ along x with free sides is uniaxial tension, P = μ (λ − λ⁻²).
     mesh = rectangle((1.0, 0.6), (2, 1))
     supports = [Sliding("x0"), Sliding("y0"), Prescribed("x1", (1.0, None))]
