@@ -267,6 +267,8 @@ ACROSS = Mesh(RING.points - [1.2, 0.0], RING.cells, surfaces=RING.surfaces)
         ),
         (RING, Axisymmetric(), [], [], "free to shift along y"),
         (RING, PlaneStrain(), [Clamped("x0")], [Gravity((0.0, 0.0, 1.0))], "out of the plane"),
+        (RING, Axisymmetric(), [Clamped("y0")], [Gravity((1.0, 0.0))], "axis of revolution"),
+        (RING, Axisymmetric(), [Clamped("y0")], [Force("outer", (1.0, 0.0))], "axis of revolution"),
         (RING, PlaneStrain(), [Prescribed("x0", (0.0, 0.0, 1.0))], [], "out of the plane"),
         (RING, PlaneStrain(), [Clamped("x0")], [Pressure("inner", 0.1)], "leaks"),
         (

@@ -95,20 +95,31 @@ def check_section(mesh: Mesh, section: Section | None) -> None:
         )
 
 
-def in_section(vector: tuple[float, ...], dimension: int, section: Section | None, key: str) -> Floats:
-    """Return the components ``(d,)`` of a vector with a meaning in the model's dimension.
+def in_section(vector: tuple[float, ...], mesh: Mesh, section: Section | None, key: str, total: bool) -> Floats:
+    """Return the components ``(d,)`` of a load's vector that have a meaning in the model.
+
+    Parameters
+    ----------
+    vector
+        As the user gave it.
+    mesh, section
+        The model.
+    key
+        Name of the load, for the message.
+    total
+        Whether it is one vector for the whole body (weight, a force), not one per area, which in a body of revolution
+        may point outward all around.
 
     Raises
     ------
     InputError
-        If it leaves the plane of a plane model.
+        If it leaves the plane of a plane model, or points across the axis of a body of revolution.
     """
     components = np.asarray(vector, dtype=float)
-    if len(components) < dimension or components[dimension:].any():
-        raise InputError(
-            "the vector does not fit the model",
-            key=key,
-            value=vector,
-            expected=f"{dimension} components" + (", none out of the plane" if section is not None else ""),
-        )
-    return components[:dimension]
+    d = mesh.dimension
+    across = total and isinstance(section, Axisymmetric) and components[0] != 0.0
+    if len(components) < d or components[d:].any() or across:
+        where = ", none out of the plane" if section is not None else ""
+        expected = "a vector along y, the axis of revolution" if across else f"{d} components{where}"
+        raise InputError("the vector does not fit the model", key=key, value=vector, expected=expected)
+    return components[:d]

@@ -18,7 +18,7 @@ from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
-from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, Vector, body_force, surface_force
+from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
 from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import SparsePattern, packed_size
 from turgor.fem.section import PlaneStress, Section, check_section, in_section
@@ -270,20 +270,18 @@ class System:
     def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
         nodal = np.zeros_like(self.mesh.points)
         if isinstance(load, Gravity):
-            acceleration = self._components(load.acceleration, "gravity")
+            acceleration = in_section(load.acceleration, self.mesh, self.section, "gravity", total=True)
             for solid in self.solids:
                 if solid.material.density is None:
                     raise InputError("gravity acts on a material without density", key="density")
                 body_force(solid.nodes, solid.dV, solid.material.density, acceleration, nodal)
         else:
-            vector = self._components(load.vector, f"loads.{load.surface}")
+            total = isinstance(load, Force)
+            vector = in_section(load.vector, self.mesh, self.section, f"loads.{load.surface}", total)
             area = surface_force(self.mesh.points, self.mesh.surface(load.surface), vector, self.section, nodal)
-            if isinstance(load, Force):
+            if total:
                 nodal /= area
         return DeadLoad(nodal, channel)
-
-    def _components(self, vector: Vector, key: str) -> Floats:
-        return in_section(vector, self.mesh.dimension, self.section, key)
 
 
 def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section | None) -> list[Solid]:
