@@ -20,7 +20,7 @@ from turgor.fem.supports import Sliding, Support
 from turgor.fem.system import System
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import quarter_ring, rectangle, shell_octant, tube_sector
-from turgor.solver.path import solve_path
+from turgor.solver.path import LimitPressureError, solve_path
 
 MU, INNER, OUTER = 0.1, 1.0, 1.5
 
@@ -157,3 +157,18 @@ def test_limit_of_the_sphere_lies_where_it_should():
     pressures = np.array([sphere_pressure(s) for s in stretches])
     assert pressures.max() / MU == pytest.approx(0.4935, abs=5e-5)
     assert stretches[pressures.argmax()] == pytest.approx(1.603, abs=1e-3)
+
+
+@pytest.mark.parametrize(("name", "kind"), [("sphere", "hex27"), ("turned sphere", "quad9"), ("turned sphere", "tri6")])
+def test_the_solver_finds_that_limit(name, kind):
+    body = BODIES[name]
+    mesh = body.mesh(4 if kind == "tri6" else 2, kind)
+    loads = [Pressure("inner", 0.06)]
+    system = System(mesh, {"body": neo_hookean(MU, 1e5)}, body.supports, loads, section=body.section)
+    with pytest.raises(LimitPressureError) as stop:
+        solve_path(system, [0.5, 1.0])
+    limit = stop.value.limit.equilibrium
+    assert float(limit.state.loads[0]) / MU == pytest.approx(0.4935, rel=1e-3)
+    inner = mesh.surface_nodes("inner")
+    stretch = body.radial(mesh.points[inner] + limit.state.u[inner]).mean() / INNER
+    assert stretch == pytest.approx(1.603, rel=5e-3)
