@@ -172,7 +172,6 @@ def find_equilibrium(
         du = system.nodal(linear.solve(-residual))
         if moving:
             du += pending
-            moving = False
         change = 0.0
         if control is not None:
             direction = system.load_direction(state)
@@ -182,7 +181,10 @@ def find_equilibrium(
             value -= by_conjugate * float(np.vdot(direction, du))
             change = -value / (by_conjugate * compliance + by_fraction)
             du += change * response
-        state, damping = _advanced(system, state, du, residuals, search=control is None)
+        state, damping = _advanced(system, state, du, residuals, search=control is None and not moving)
+        # What a shortened step left of the given displacements is imposed by the next one.
+        pending = (1.0 - damping) * pending
+        moving = moving and damping < 1.0
         fraction += damping * change
         state = state.with_loads(system.loads_at(fraction))
 

@@ -28,6 +28,9 @@ EASY = 7
 FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
 
+STIFFER = 6
+"""How often contact is made stiffer before one equilibrium is given up."""
+
 VOLUME_STEPS = 60
 """Steps that volume control may take between two requested loads."""
 
@@ -259,13 +262,18 @@ class _Walk:
                 self.on_progress(aim, iteration, residual)
 
         found = find_equilibrium(self.system, self.linear, guess, aim, self.options.newton, report)
-        while (overlap := _overlap(self.system, found.state)) > LARGEST_OVERLAP:
+        for _ in range(STIFFER):
+            overlap = _overlap(self.system, found.state)
+            if overlap <= LARGEST_OVERLAP:
+                return found
             penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
             log.info("overlap of %.2g of the wall: contact made stiffer, factor %.3g", overlap, penalty)
             self._count(found)
             stiffer = replace(found.state, penalty=penalty)
             found = find_equilibrium(self.system, self.linear, stiffer, aim, self.options.newton, report)
-        return found
+        raise NotConvergedError(
+            "surfaces overlap too much however stiff their contact is", facts={"overlap_per_wall": overlap}
+        )
 
     def _predicted(self, aim: float) -> State:
         """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out.

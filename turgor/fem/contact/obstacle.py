@@ -159,7 +159,7 @@ class Obstacle:
         return gap.reshape(shape), normal.reshape(*shape, 3), curvature.reshape(*shape, 3, 3)
 
     def _normal_stiffness(self, state: State) -> Floats:
-        return np.asarray(state.penalty * STIFFNESS * (self.skin.load / self.skin.wall)[:, None] * self.skin.area)
+        return np.asarray(state.penalty * STIFFNESS * (self.skin.load / self.skin.grip)[:, None] * self.skin.area)
 
     def _pushes(self, state: State) -> Floats:
         """Return what each point pushes the body with, ``(k, q, 3)``, N."""

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from turgor.fem.contact.pairs import FACING
 from turgor.fem.elements import TRI6
 from turgor.materials.hyperelastic import Hyperelastic
-from turgor.mesh.faces import host_cells
+from turgor.mesh.faces import boundary_faces, host_cells
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -24,12 +24,13 @@ ASKEW = 0.2
 """So much farther from opposite (in cosine) may the middles of two curved faces be than the places where they touch."""
 
 DEPTH = 0.6
-"""Part of the wall, and of a face's size, up to which a point behind a face counts as overlapping it."""
+"""Part of the wall, or of a face's size if that is less, up to which a point behind a face counts as overlapping it."""
 
 STIFFNESS = 500.0
 """Contact stiffness times wall over pressure: at the pressure the overlap is 1/500 of the wall, at 2.5 times it 1/200.
 
-Walls that press on each other carry up to about 2.5 times the air pressure (measured).
+Walls that press on each other carry up to about 2.5 times the air pressure (measured). Where the faces are smaller than
+the wall is thick, their size counts instead: contact then has details smaller than the wall.
 """
 
 PART_OF_MODULUS = 0.25
@@ -62,6 +63,8 @@ class Skin:
         Thickness of the body behind each face, ``(k,)``, mm.
     load
         Scale of the contact pressure of each face, ``(k,)``, MPa.
+    grip
+        Thickness of the wall or size of the face, whichever is less, ``(k,)``, mm.
     depth
         How far a point may lie behind a face and still count as overlapping it, ``(k,)``, mm.
     size
@@ -76,13 +79,18 @@ class Skin:
         tangents = np.einsum("qar,fai->fqri", TRI6.gradient_at_quadrature, mesh.points[faces])
         self.area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * TRI6.weights
         self._centre, self._normal, self._radius = _balls(mesh.points, self.faces)
-        self._part = _parts(mesh)[self.faces[:, 0]]
+        part_of_node = _parts(mesh)
+        self._part = part_of_node[self.faces[:, 0]]
         self.size = float(np.sqrt(self.area.sum() / len(faces)))
         self.wall = np.empty(len(faces))
+        whole = boundary_faces(mesh.cells)
         for part in np.unique(self._part):
+            centre, normal, _ = _balls(mesh.points, whole[part_of_node[whole[:, 0]] == part])
             here = self._part == part
-            self.wall[here] = wall_thickness(self._centre[here], self._normal[here])
-        self.depth = DEPTH * np.minimum(self.wall, 2.0 * self._radius)
+            _, same = cKDTree(centre).query(self._centre[here])
+            self.wall[here] = wall_thickness(centre, normal)[same]
+        self.grip = np.minimum(self.wall, np.sqrt(2.0 * self.area.sum(axis=1)))
+        self.depth = DEPTH * self.grip
         modulus = np.empty(mesh.n_cells)
         for region, material in materials.items():
             modulus[mesh.region(region)] = material.shear_modulus
@@ -99,6 +107,9 @@ class Skin:
         start, candidates
             In compressed rows: the candidates of face ``f`` are ``candidates[start[f]:start[f + 1]]``.
         """
+        if not np.isfinite(x).all():
+            # The iteration has gone astray, which is for the solver to say.
+            return np.zeros(len(self.faces) + 1, np.intp), np.empty(0, np.int32)
         centre, normal, radius = _balls(x, self.faces)
         first, second = _opposed(centre, normal, 2.0 * radius.max() + max(reach, self.depth.max()))
         between = np.linalg.norm(centre[first] - centre[second], axis=1)
@@ -168,7 +179,7 @@ def _balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
     nodes = x[faces]
     centre = nodes[:, 3:].sum(axis=1) * (4.0 / 9.0) - nodes[:, :3].sum(axis=1) / 9.0
     normal = np.cross(nodes[:, 4] - nodes[:, 3], nodes[:, 5] - nodes[:, 3])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
     radius = np.linalg.norm(nodes - centre[:, None, :], axis=2).max(axis=1)
     return centre, normal, radius
 

@@ -192,11 +192,11 @@ class SurfaceContact:
     def _normal_stiffness(self, state: State, pairs: Pairs) -> Floats:
         skin = self.skin
         load = np.minimum(skin.load[pairs.face], skin.load[pairs.masters])
-        wall = np.minimum(skin.wall[pairs.face], skin.wall[pairs.masters])
-        return np.asarray(state.penalty * STIFFNESS * load / wall * 0.5 * skin.area[pairs.face, pairs.quad])
+        grip = np.minimum(skin.grip[pairs.face], skin.grip[pairs.masters])
+        return np.asarray(state.penalty * STIFFNESS * load / grip * 0.5 * skin.area[pairs.face, pairs.quad])
 
     def _depth(self, pairs: Pairs) -> Floats:
-        return np.minimum(self.skin.depth[pairs.face], self.skin.depth[pairs.masters])
+        return np.asarray(np.minimum(self.skin.depth[pairs.face], self.skin.depth[pairs.masters]))
 
     def _at_points(self, pairs: Pairs, values: Floats) -> Floats:
         field = np.zeros(self.skin.area.shape)

@@ -1,0 +1,66 @@
+"""Bodies that touch: meshes in several parts, hollow boxes, graded blocks, and an independent look for overlaps."""
+
+from __future__ import annotations
+
+import ipctk
+import numpy as np
+
+from turgor.mesh.faces import boundary_faces
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.structured import box
+
+QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+
+
+def merged(**parts: Mesh) -> Mesh:
+    """Several bodies as one mesh; surfaces are called ``part-surface``."""
+    offsets = np.cumsum([0, *(mesh.n_points for mesh in parts.values())])
+    surfaces = {
+        f"{name}-{surface}": faces + offset
+        for (name, mesh), offset in zip(parts.items(), offsets, strict=False)
+        for surface, faces in mesh.surfaces.items()
+    }
+    cells = [mesh.cells + offset for mesh, offset in zip(parts.values(), offsets, strict=False)]
+    return Mesh(np.vstack([mesh.points for mesh in parts.values()]), np.vstack(cells), surfaces=surfaces)
+
+
+def shifted_mesh(mesh: Mesh, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Mesh:
+    return Mesh(mesh.points + np.array([x, y, z]), mesh.cells, surfaces=mesh.surfaces)
+
+
+def graded(mesh: Mesh, axis: int, divisions: int, places: np.ndarray) -> Mesh:
+    """Put the grid planes across `axis` of a unit-length box at the given places; in between, linearly."""
+    points = mesh.points.copy()
+    points[:, axis] = np.interp(points[:, axis] * divisions, np.arange(divisions + 1), places)
+    return Mesh(points, mesh.cells, surfaces=mesh.surfaces)
+
+
+def half_chamber(lengths: tuple[float, float, float], divisions: tuple[int, int, int]) -> Mesh:
+    """The half y ≥ 0 of a hollow box with walls one cell thick; surfaces ``cavity y0 z0 x0 x1``."""
+    grid = box(lengths, divisions)
+    size = np.array(lengths) / divisions
+    middle = grid.points[grid.cells[:, :4]].mean(axis=1)
+    air = (middle[:, [0, 2]] > size[[0, 2]]).all(axis=1) & (middle < np.array(lengths) - size).all(axis=1)
+    used, cells = np.unique(grid.cells[~air], return_inverse=True)
+    cells, points = cells.reshape(-1, 10).astype(np.int32), grid.points[used]
+    faces = boundary_faces(cells)
+    ends = {f"{'xyz'[axis]}{k}": (axis, k * lengths[axis]) for axis in range(3) for k in (0, 1)}
+    sides = {name: (points[faces][:, :, axis] == at).all(axis=1) for name, (axis, at) in ends.items()}
+    surfaces = {name: faces[here] for name, here in sides.items()}
+    return Mesh(points, cells, surfaces=surfaces | {"cavity": faces[~np.any(list(sides.values()), axis=0)]})
+
+
+def overlaps_by_more_than(mesh: Mesh, u: np.ndarray, depth: float) -> bool:
+    """Whether the skin, with every node drawn `depth` into the body, still intersects itself (IPC Toolkit)."""
+    faces = boundary_faces(mesh.cells)
+    x = mesh.points + u
+    triangles = faces[:, QUARTERS].reshape(-1, 3)
+    normal = np.zeros_like(x)
+    across = np.cross(x[triangles[:, 1]] - x[triangles[:, 0]], x[triangles[:, 2]] - x[triangles[:, 0]])
+    for k in range(3):
+        np.add.at(normal, triangles[:, k], across)
+    used, local = np.unique(triangles, return_inverse=True)
+    local = local.reshape(-1, 3)
+    drawn = x[used] - depth * normal[used] / np.linalg.norm(normal[used], axis=1, keepdims=True)
+    skin = ipctk.CollisionMesh(drawn, ipctk.edges(local), local)
+    return bool(ipctk.has_intersections(skin, drawn))

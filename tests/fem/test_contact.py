@@ -1,0 +1,175 @@
+"""Contact: its forces and stiffnesses on random states that touch, what it leaves alone, and the room it needs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_bodies import half_chamber, merged, shifted_mesh
+from samples import differences, neo_hookean, random_state, shifted
+
+from turgor.common.errors import InputError
+from turgor.fem.contact.pairs import find_partners
+from turgor.fem.contact.skin import Skin
+from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
+from turgor.fem.frames import block_products
+from turgor.fem.rigid import Box, Cylinder, Plane, Sphere
+from turgor.fem.supports import Clamped, Sliding
+from turgor.fem.system import System
+from turgor.mesh.faces import boundary_faces
+from turgor.mesh.structured import box, shell_octant
+
+BODIES = {
+    "plane": Plane((0.0, 0.0, 0.35), (0.1, 0.2, 1.0)),
+    "sphere": Sphere((1.2, 1.0, -2.8), 3.0),
+    "cylinder": Cylinder((-1.0, 0.7, -1.9), (3.0, 1.0, -1.9), 2.0),
+    "cylinder's end": Cylinder((1.0, 1.0, -2.0), (1.0, 1.0, 0.1), 1.5),
+    "box": Box((0.3, 0.4, -1.0), (1.5, 1.7, 0.07)),
+}
+
+
+def stacked(gap: float) -> System:
+    """A small block over a larger one, meshes that do not match, and a rigid sphere that pushes from below."""
+    low, high = box((2.0, 2.0, 1.0), (2, 2, 1)), box((1.2, 1.3, 1.0), (3, 2, 1))
+    mesh = merged(low=low, high=shifted_mesh(high, 0.4, 0.35, 1.0 + gap))
+    contact = [SelfContact(), RigidContact(BODIES["sphere"], motion=(0.1, 0.0, 0.1))]
+    return System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("low-z0"), Clamped("high-z1")], contact=contact)
+
+
+def force_of(term, state):
+    out = np.zeros_like(state.u)
+    term.force(state, out)
+    return out
+
+
+def check_contact(term, state):
+    """Compare force and stiffness with differences, as for other terms; the blocks are those of this state."""
+    direction = np.random.default_rng(7).standard_normal(state.u.shape)
+    slope = np.vdot(force_of(term, state), direction)
+    assert term.touch(state).overlap > 1e-3
+    assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-6)
+    nodes, packed = term.blocks(state, term.lagged_at(state.u, state.loads))
+    assert len(nodes) > 3
+    product = np.zeros_like(state.u)
+    block_products(nodes, packed, direction, product)
+    step = 1e-6
+    more, less = (force_of(term, shifted(state, direction, h)) for h in (step, -step))
+    expected = (more - less) / (2 * step)
+    np.testing.assert_allclose(product, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_self_contact():
+    system = stacked(-0.05)
+    check_contact(system.contacts[0], random_state(system, 0.008))
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_rigid_body(name):
+    case = RigidContact(BODIES[name], motion=(0.03, -0.02, 0.01))
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
+    system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=[case])
+    state = random_state(system, 0.008)
+    term = system.contacts[0]
+    check_contact(term, state)
+    # the force on the body is minus the derivative by its place, its derivative by the motion's factor likewise
+    more, less = (state.with_loads(state.loads + h) for h in (1e-5, -1e-5))
+    assert term.conjugate(state) == pytest.approx(-(term.energy(more) - term.energy(less)) / 2e-5, rel=1e-6)
+    assert np.dot(term.touch(state).force, case.motion) == pytest.approx(term.conjugate(state), rel=1e-12)
+    gradient = np.zeros_like(state.u)
+    term.load_gradient(state, gradient)
+    expected = (force_of(term, more) - force_of(term, less)) / 2e-5
+    np.testing.assert_allclose(gradient, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_distance_of_rigid_bodies(name):
+    x = np.random.default_rng(0).uniform(-1.0, 2.0, (50, 3))
+    gap, normal, curvature = BODIES[name].distance(x)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-12)
+    for axis in range(3):
+        step = np.eye(3)[axis] * 1e-6
+        (more, more_normal, _), (less, less_normal, _) = (BODIES[name].distance(x + h) for h in (step, -step))
+        smooth = np.abs(more_normal - less_normal).max(axis=1) < 1e-3
+        assert smooth.sum() > 40
+        np.testing.assert_allclose(normal[smooth, axis], ((more - less) / 2e-6)[smooth], atol=1e-7)
+        slope = (more_normal - less_normal) / 2e-6
+        np.testing.assert_allclose(curvature[smooth][:, :, axis], slope[smooth], atol=1e-6)
+    assert (gap < 0).any()
+
+
+def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room():
+    system = stacked(1.5)  # far apart at rest: nothing is coupled between the blocks yet
+    pattern = system.pattern
+    lift = np.where(system.mesh.points[:, 2] > 1.2, -1.55, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
+    noise = 0.008 * np.random.default_rng(1).standard_normal(lift.shape)
+    state = system.consistent(lift + noise, system.loads_at(0.7))
+    assert all(touch.overlap > 1e-3 for touch in system.touches(state))
+    system.stiffness(state)
+    assert system.pattern is not pattern
+    assert system.pattern.n_stored > pattern.n_stored
+    direction = np.random.default_rng(4).standard_normal(state.u.shape)
+    more, less = (system.forces(shifted(state, direction, h))[0] for h in (1e-6, -1e-6))
+    expected = (more - less) / 2e-6
+    np.testing.assert_allclose(system.stiffness_times(direction), expected, atol=1e-6 * np.abs(expected).max())
+    # a state nearby finds room where there is some already
+    pattern = system.pattern
+    system.stiffness(system.consistent(lift + 1.5 * noise, system.loads_at(0.7)))
+    assert system.pattern is pattern
+
+
+def test_nothing_touches_at_rest_or_through_a_wall():
+    # The walls' two sides are opposite and behind one another, at rest and when the wall has become thin.
+    mesh = half_chamber((6.0, 3.0, 6.0), (6, 3, 6))
+    system = System(mesh, {"body": neo_hookean()}, [Clamped("z0"), Sliding("y0")], contact=[SelfContact()])
+    for thinner in (1.0, 0.5, 0.2):
+        # the cavity's walls move outward until only this part of their thickness is left
+        u = np.zeros_like(mesh.points)
+        inside = np.unique(mesh.surface("cavity"))
+        centre = np.array([3.0, 0.0, 3.0])
+        scale = np.array([(3.0 - thinner) / 2.0] * 3)
+        u[inside] = (mesh.points[inside] - centre) * (scale - 1.0)
+        state = system.consistent(u, np.zeros(0))
+        assert system.touches(state)[0].area == 0.0
+
+
+def test_walls_are_measured():
+    for mesh, wall, tolerance in (
+        (half_chamber((6.0, 3.0, 6.0), (6, 3, 6)), 1.0, 0.35),
+        (shell_octant(5.0, 5.8, 2), 0.8, 0.05),
+    ):
+        skin = Skin(mesh, boundary_faces(mesh.cells), {"body": neo_hookean()}, 0.0)
+        assert np.median(skin.wall) == pytest.approx(wall, rel=tolerance)
+
+
+def test_closest_points_are_closest():
+    # Points in front of a curved face, against a search over a fine grid of the face.
+    mesh = shell_octant(1.0, 1.5, 1)
+    face = mesh.surface("outer")[:1]
+    local = np.linspace(0.0, 1.0, 401)
+    a, b = (grid[grid_sum] for grid_sum in [np.add.outer(local, local) <= 1.0] for grid in np.meshgrid(local, local))
+    skin = Skin(mesh, face, {"body": neo_hookean()}, 0.0)
+    bary = np.column_stack([1 - a - b, a, b])
+    shape = np.column_stack([bary * (2 * bary - 1), *(4 * bary[:, i] * bary[:, (i + 1) % 3] for i in range(3))])
+    surface = shape @ mesh.points[face[0]]
+    # the face itself, mirrored and drawn out, is the slave
+    points = np.vstack([mesh.points, 1.07 * mesh.points])
+    faces = np.vstack([face, face[:, [0, 2, 1, 5, 4, 3]] + mesh.n_points]).astype(np.int32)
+    start, candidates = np.array([0, 0, 1]), np.array([0], np.int32)
+    shape_of = (2, len(skin.rule))
+    partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
+    find_partners(points, faces, skin.rule, start, candidates, np.ones(2), 1.0, partner, at, gap)
+    assert (partner[1] == 0).all()
+    slaves = skin.shape @ points[faces[1]]
+    nearest = np.linalg.norm(slaves[:, None] - surface[None], axis=2).min(axis=1)
+    np.testing.assert_allclose(gap[1], nearest, rtol=1e-4)
+    assert (gap[1] <= nearest + 1e-12).all()
+
+
+def test_refusals():
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    for case in (PairContact("x0", "nowhere"), RigidContact(Sphere((0, 0, 0), 1.0), "nowhere")):
+        with pytest.raises(InputError, match="nowhere"):
+            System(mesh, {"body": neo_hookean()}, [Clamped("x0")], contact=[case])
+    with pytest.raises(InputError, match="positive"):
+        Sphere((0.0, 0.0, 0.0), 0.0)
+    with pytest.raises(InputError, match="no length"):
+        Plane((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
