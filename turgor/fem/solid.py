@@ -41,11 +41,6 @@ class Solid:
         The hyperelastic law of the region.
     section
         What a plane mesh stands for.
-
-    Attributes
-    ----------
-    surface
-        Size of the derivative of each element's volume by its nodes, ``(m,)``, mm²: what a pressure in it acts on.
     """
 
     def __init__(
@@ -62,7 +57,8 @@ class Solid:
         self.cell = body_cell(self.nodes)
         self.G, self.dV = reference_gradients(points[self.nodes], self.cell, section)
         self.volume = self.dV.sum(axis=1)
-        self.surface = np.linalg.norm(np.einsum("mqsa,mq->msa", self.G, self.dV), axis=(1, 2))
+        self._surface = np.linalg.norm(np.einsum("mqsa,mq->msa", self.G, self.dV), axis=(1, 2))
+        self._steepest = np.abs(self.G).sum(axis=3).max(axis=(1, 2))
         self.modes = self._modes(points[self.nodes])
         self._share = self.modes * (self.dV / self.volume[:, None])[:, :, None]
         m, q, _, n = self.G.shape
@@ -92,6 +88,15 @@ class Solid:
         self._deform(u)
         at = int(np.argmin(self._J.min(axis=1)))
         return float(self._J[at].min()), int(self.index[at])
+
+    def rounding(self, u: Floats) -> float:
+        """Return the size of the forces, N, that rounding alone causes at displacement `u`.
+
+        A last digit of J, itself and by the last digits of the displacements of which it holds the differences, times
+        the bulk modulus and what a pressure in the element acts on.
+        """
+        digits = np.finfo(float).eps * (10.0 + np.abs(u).max() * self._steepest)
+        return self.material.bulk_modulus * float(np.linalg.norm(digits * self._surface))
 
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""

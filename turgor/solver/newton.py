@@ -145,14 +145,13 @@ def find_equilibrium(
     state = guess.with_loads(system.loads_at(fraction))
     pending = system.constraints.imposed(state.u, fraction) - state.u
     moving = bool(np.any(pending))
-    # Where all forces are tiny, rounding is not to be mistaken for imbalance.
-    smallest = _rounding(system) / options.tolerance
     residuals: list[float] = []
     compliance: float | None = None
     while True:
         force, scale = system.forces(state)
         residual = system.free_part(force)
-        relative = float(np.linalg.norm(residual)) / max(scale, smallest)
+        # Where all forces are tiny, rounding is not to be mistaken for imbalance.
+        relative = float(np.linalg.norm(residual)) / max(scale, _rounding(system, state) / options.tolerance)
         gap = 0.0 if control is None else _relative_gap(control, system.conjugate(state), fraction)
         residuals.append(relative)
         if on_iteration is not None:
@@ -258,10 +257,9 @@ def _accepted(
     return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots, compliance)
 
 
-def _rounding(system: System) -> float:
-    """Return the size of the forces, N, that rounding alone causes: bulk modulus times area times a few units."""
-    squares = sum(float(np.sum((s.material.bulk_modulus * s.surface) ** 2)) for s in system.solids)
-    return 10.0 * np.finfo(float).eps * float(np.sqrt(squares))
+def _rounding(system: System, state: State) -> float:
+    """Return the size of the forces, N, that rounding alone causes."""
+    return float(np.linalg.norm([solid.rounding(state.u) for solid in system.solids]))
 
 
 def _failure(reason: str, system: System, state: State, residuals: list[float]) -> NotConvergedError:
