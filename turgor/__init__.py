@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from turgor.common.errors import InputError, MissingPackageError, SolverError, TurgorError
     from turgor.geometry.catalogue import template, templates
+    from turgor.materials.assessment import assess
     from turgor.materials.fit import fit
     from turgor.materials.library import find as find_material
     from turgor.materials.library import library
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
         ReinforcedTube,
         StepFile,
     )
+    from turgor.study.specimen import read_tests
 
 __all__ = [
     "Bellows",
@@ -60,6 +62,7 @@ __all__ = [
     "SolverError",
     "StepFile",
     "TurgorError",
+    "assess",
     "environment",
     "find_material",
     "fit",
@@ -70,6 +73,7 @@ __all__ = [
     "mesh_case",
     "mesh_quality",
     "models",
+    "read_tests",
     "run",
     "template",
     "templates",
@@ -81,6 +85,7 @@ __all__ = [
 _HOMES = {
     "turgor.common.errors": ("InputError", "MissingPackageError", "SolverError", "TurgorError"),
     "turgor.geometry.catalogue": ("template", "templates"),
+    "turgor.materials.assessment": ("assess",),
     "turgor.materials.fit": ("fit",),
     "turgor.materials.library": ("find_material", "library"),
     "turgor.materials.registry": ("material", "models"),
@@ -103,6 +108,7 @@ _HOMES = {
         "ReinforcedTube",
         "StepFile",
     ),
+    "turgor.study.specimen": ("read_tests",),
 }
 """Module → the public names that it defines."""
 

@@ -141,6 +141,48 @@ def test_a_written_material_fits_into_a_case(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))["recommended"] == "yeoh-1"
 
 
+def test_a_fit_is_told_what_its_file_does_not_say() -> None:
+    plain = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--json")
+    told = turgor("fit", GOOD_TEST, "--model", "yeoh-1", "--strain-source", "crosshead", "--json")
+    assert "crosshead" in told.stderr
+    assert "gauge" in told.stderr
+    assert json.loads(told.stdout)["data"]["tests"][0]["strain_source"] == "crosshead"
+    lengths = ("--gauge-length", "33 mm", "--effective-gauge-length", "66 mm")
+    stiffer = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--json", *lengths)
+    assert stiffer["data"]["tests"][0]["strain_max"] == pytest.approx(plain["data"]["tests"][0]["strain_max"] / 2)
+    stress = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--json", "--known-modulus", "0.1 MPa")
+    assert stress["data"]["tests"][0]["corrections"]
+    relative = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--relative", "--weight", "2", "--json")
+    assert relative["data"]["error"] == "relative"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--gauge-length", "33"], ("gauge_length", "a unit is missing")),
+        (["--effective-gauge-length", "33 mm"], ("gauge_length", "the gauge length that was used")),
+        (["--strain-source", "guess"], ("strain_source", "'guess'", "crosshead")),
+        (["--weight", "1", "--weight", "2"], ("weights", "1 numbers, one for each test")),
+        (["--stability", "maybe"], ("stability", "'maybe'", "prefer, require or ignore")),
+        (["--stable-to", "0.5"], ("stable_to", "above 1")),
+        (["--known-modulus", "500 MPa"], ("does not reach the known modulus",)),
+    ],
+)
+def test_a_wrong_option_of_a_fit_is_refused(options: list[str], words: tuple[str, ...]) -> None:
+    result = turgor("fit", GOOD_TEST, "--model", "yeoh-1", *options)
+    assert result.exit_code == 2, result.output
+    for word in words:
+        assert word in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_a_material_is_assessed() -> None:
+    found = printed("materials", "tpu-0deg-mooney-rivlin-5", "--json")["assessment"]
+    assert found["drucker_stable"] is False
+    assert found["drucker_lost"]["equibiaxial"]["tension"] == pytest.approx(1.09, abs=0.02)
+    assert "equibiaxial beyond 1." in turgor("materials", "tpu-0deg-mooney-rivlin-5").stdout
+
+
 def test_materials() -> None:
     names = [entry["name"] for entry in printed("materials", "--json")]
     assert len(names) > 20

@@ -20,6 +20,7 @@ from turgor.study.reinforcement import (
     QuadraticCase,
     SheetCase,
 )
+from turgor.study.specimen import SpecimenCase
 
 TEXT = (Path(__file__).parents[2] / "docs" / "cases.md").read_text(encoding="utf-8")
 
@@ -42,6 +43,7 @@ def test_the_case_of_the_page_loads(tmp_path: Path) -> None:
         LibraryMaterial,
         ModelMaterial,
         FittedMaterial,
+        SpecimenCase,
         DisplacementCase,
         ElasticCase,
         PressureCase,

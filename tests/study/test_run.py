@@ -26,6 +26,7 @@ class Watch:
 
     def __init__(self, interrupt_after: int | None = None) -> None:
         self.stages: list[str] = []
+        self.warnings: list[str] = []
         self.fractions: list[float] = []
         self.interrupt_after = interrupt_after
 
@@ -35,6 +36,10 @@ class Watch:
     def note(self, text: str) -> None:
         if self.interrupt_after is not None and len(self.fractions) >= self.interrupt_after:
             raise KeyboardInterrupt
+
+    def warn(self, text: str) -> None:
+        assert "mesh" not in self.stages, "too late"
+        self.warnings.append(text)
 
     def advance(self, fraction: float, text: str) -> None:
         self.fractions.append(fraction)
@@ -147,6 +152,21 @@ def test_a_run_that_stops_short_keeps_what_it_reached(small_tube: Path, tmp_path
     assert 0 < summary["facts"]["last_fraction"] < 1
     assert summary["facts"]["pressure:cavity_kPa"] == pytest.approx(summary["final"]["pressure_kPa"])
     assert (stopped.folder / "report.html").exists()
+
+
+@pytest.mark.usefixtures("unreported")
+def test_an_unstable_material_is_told_of_before_the_mesh(small_tube: Path, tmp_path: Path) -> None:
+    unstable = "materials.body={library: tpu-0deg-mooney-rivlin-5}"
+    watch = Watch()
+    done = run(load_case(small_tube, [unstable, "solver.steps=1"]), tmp_path / "run", progress=watch)
+    assert "materials.body: the material is unstable where the run may go (equibiaxial beyond" in watch.warnings[0]
+    assert watch.warnings[0] in (done.folder / "run.log").read_text(encoding="utf-8")
+    watch = Watch()
+    run(load_case(small_tube, [unstable, "solver.steps=1", "largest_stretch=1.04"]), tmp_path / "2", progress=watch)
+    assert watch.warnings == []
+    watch = Watch()
+    run(load_case(small_tube, ["solver.steps=1"]), tmp_path / "3", progress=watch)
+    assert watch.warnings == []
 
 
 FIT = "materials.body={fit: 'soft rubber.csv', models: [yeoh-1, neo-hookean], poisson: 0.499}"

@@ -81,6 +81,33 @@ def fit(
     strain_range: Annotated[
         str | None, typer.Option(metavar="A:B", help="Strains between which the tests count, as in 0:3 or 0:300%.")
     ] = None,
+    relative: Annotated[bool, typer.Option("--relative", help="Residuals count relative to the stress.")] = False,
+    weights: Annotated[
+        list[float] | None, typer.Option("--weight", metavar="W", help="Factor of a test, in the order of the tests.")
+    ] = None,
+    stability: Annotated[
+        str, typer.Option(metavar="CHOICE", help="prefer, require or ignore fits that are stable.")
+    ] = "prefer",
+    stable_to: Annotated[
+        float | None, typer.Option(metavar="STRETCH", help="How far to be stable; the tests' largest if left out.")
+    ] = None,
+    mode: Annotated[
+        str | None, typer.Option(metavar="MODE", help="Kind of test, where the files do not say it.")
+    ] = None,
+    strain_source: Annotated[
+        str | None, typer.Option(metavar="SOURCE", help="Of the strain: extensometer, video, crosshead or unknown.")
+    ] = None,
+    gauge_length: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="With which displacements become strain.")
+    ] = None,
+    effective_gauge_length: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Corrects the strain to the length that really stretched.")
+    ] = None,
+    area: Annotated[str | None, typer.Option(metavar="AREA", help="With which forces become stress.")] = None,
+    known_modulus: Annotated[
+        str | None, typer.Option(metavar="STRESS", help="Corrects the strain by the known stress at 100 % strain.")
+    ] = None,
+    remove_toe: Annotated[bool, typer.Option("--remove-toe", help="Count strain from the end of the toe.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.yaml", help="Write the recommended material for a case file.")
     ] = None,
@@ -88,7 +115,28 @@ def fit(
     as_json: AsJson = False,
 ) -> None:
     """Fit material models to tensile and other tests."""
-    fitted = tg.fit(data, models or "all", strain_range=strain_range)
+    tests = tg.read_tests(
+        data,
+        mode=mode,
+        strain_source=strain_source,
+        gauge_length=gauge_length,
+        effective_gauge_length=effective_gauge_length,
+        area=area,
+        known_modulus=known_modulus,
+        remove_toe=remove_toe,
+    )
+    fitted = tg.fit(
+        tests,
+        models or "all",
+        strain_range=strain_range,
+        error="relative" if relative else "absolute",
+        weights=weights,
+        stability=stability,  # type: ignore[arg-type]  # the fit says which choices there are
+        stable_to=stable_to,
+    )
+    for test in fitted.tests:
+        for warning in test.warnings:
+            tell(f"{test.file}: {warning}")
     if out:
         tg.write_material(fitted, out)
     if report:
@@ -105,13 +153,17 @@ def materials(
     as_json: AsJson = False,
 ) -> None:
     """List the published materials, or show one."""
-    entries = [tg.find_material(name)] if name else tg.library()
-    if as_json:
-        print_json(entries[0].as_dict() if name else [entry.as_dict() for entry in entries])
-    elif name:
-        print_table(tables.pairs(name, entries[0].as_dict()))
+    if name:
+        entry = tg.find_material(name)
+        facts = entry.as_dict() | {"assessment": tg.assess(entry.build).as_dict()}
+        if as_json:
+            print_json(facts)
+        else:
+            print_table(tables.pairs(name, facts))
+    elif as_json:
+        print_json([entry.as_dict() for entry in tg.library()])
     else:
-        print_table(tables.library(entries))
+        print_table(tables.library(tg.library()))
 
 
 @app.command()

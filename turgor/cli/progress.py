@@ -40,6 +40,10 @@ class TerminalProgress:
         """Show a detail behind the bar."""
         self._bar.update(self._task, note=text)
 
+    def warn(self, text: str) -> None:
+        """Print a warning above the bar."""
+        self._bar.console.print(f"turgor: warning: {text}", highlight=False, markup=False, soft_wrap=True)
+
     def advance(self, fraction: float, text: str) -> None:
         """Set the part of the load that is reached, 0 to 1."""
         self._bar.update(self._task, completed=fraction, note=text)
@@ -65,6 +69,10 @@ class LineProgress:
 
     def note(self, text: str) -> None:
         """Leave out what the next line would repeat."""
+
+    def warn(self, text: str) -> None:
+        """Print a warning."""
+        self._console.print(f"turgor: warning: {text}", highlight=False, markup=False, soft_wrap=True)
 
     def advance(self, fraction: float, text: str) -> None:
         """Say the part of the load that is reached, 0 to 1."""

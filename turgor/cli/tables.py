@@ -44,6 +44,7 @@ def fits(report: FitReport) -> Table:
         constants = ", ".join(f"{name} = {value:.5g}" for name, value in entry.parameters.items())
         stability = "yes" if entry.stable else "no"
         table.add_row(mark, entry.model, f"{entry.rmse:.4g}", f"{entry.r2:.5f}", stability, constants)
+    table.caption, table.caption_justify = report.reason, "left"
     return table
 
 

@@ -170,6 +170,7 @@ def _as_value_error(read: Callable[[object], float]) -> Callable[[object], float
 Length = quantity_type("length")
 PositiveLength = quantity_type("length", 0.0, exclusive=True)
 NonNegativeLength = quantity_type("length", 0.0)
+PositiveArea = quantity_type("area", 0.0, exclusive=True)
 Pressure = quantity_type("pressure")
 PositivePressure = quantity_type("pressure", 0.0, exclusive=True)
 Force = quantity_type("force")

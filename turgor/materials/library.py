@@ -149,7 +149,7 @@ def find(name: str) -> LibraryEntry:
     entries = _entries()
     if name not in entries:
         near = get_close_matches(str(name), entries, n=3, cutoff=0.4)
-        expected = "did you mean " + " or ".join(near) if near else "a name that 'turgor materials' lists"
+        expected = " or ".join(near) if near else "a name that 'turgor materials' lists"
         raise InputError("the library has no material of this name", key="library", value=name, expected=expected)
     return entries[name]
 

@@ -57,7 +57,7 @@ def find_model(name: str | type[Hyperelastic]) -> type[Hyperelastic]:
         if name == model.name or name in model.aliases:
             return model
     near = get_close_matches(str(name), models(), n=3)
-    expected = ("did you mean " + " or ".join(near)) if near else "one of " + ", ".join(models())
+    expected = " or ".join(near) if near else "one of " + ", ".join(models())
     raise InputError("there is no material model of this name", key="model", value=name, expected=expected)
 
 

@@ -8,6 +8,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import to_text
 from turgor.fem.system import System
 from turgor.materials import Hyperelastic
+from turgor.materials.assessment import warnings_in_use
 from turgor.mesh import Mesh
 from turgor.study.boundary import GravityCase, PressureCase, TractionCase
 from turgor.study.case import Case
@@ -24,6 +25,10 @@ MOST_PRESSURE_PER_MODULUS = 100.0
 
 MOST_ELEMENTS_PER_WALL = 20
 """Beyond it the mesh is not a fine one but a slip of the unit, and would fill the memory of any machine."""
+
+
+LEAST_STRETCH = 1.05
+"""A part that is expected to stretch less is not examined: an insert so much stiffer than the body hardly strains."""
 
 
 def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
@@ -75,6 +80,21 @@ def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
                 value=to_text(load.value, "pressure"),
                 expected=f"at most {MOST_PRESSURE_PER_MODULUS:g} times the modulus; check both units",
             )
+
+
+def doubts(case: Case, materials: Mapping[str, Hyperelastic]) -> list[str]:
+    """Say what is to be known of the materials before a run goes where they cannot be trusted.
+
+    The softest is examined up to the case's largest stretch; a stiffer one, which strains less, up to a strain that is
+    smaller in the ratio of the shear moduli.
+    """
+    softest = min(material.shear_modulus for material in materials.values())
+    found = []
+    for region, material in materials.items():
+        stretch = 1.0 + (case.largest_stretch - 1.0) * softest / material.shear_modulus
+        if stretch >= LEAST_STRETCH:
+            found += [f"materials.{region}: {text}" for text in warnings_in_use(material, stretch)]
+    return found
 
 
 def every_region(materials: Mapping[str, Hyperelastic], mesh: Mesh) -> dict[str, Hyperelastic]:

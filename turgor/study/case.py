@@ -145,6 +145,9 @@ class Case(Setup):
     materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
     mesh: MeshCase = MeshCase()
     loads: tuple[Load, ...] = Field(min_length=1)
+    largest_stretch: float = Field(
+        default=2.0, strict=True, gt=1.0, description="up to which the softest material is examined before the run"
+    )
     solver: SolverCase = SolverCase()
     measures: tuple[str, ...] | None = Field(default=None, description="left out, all that the actuator's names allow")
 

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from turgor.common.errors import InputError
 from turgor.materials.fit_result import FitReport
 from turgor.materials.least_squares import predict
-from turgor.results.plots import stress_strain
+from turgor.results.fit_report import FILE_NAME, material_yaml, write_fit_page
 
 _POINTS = 200
 """Points of a drawn curve; a test with more points than that is thinned out for the drawing only."""
@@ -47,12 +46,7 @@ def write_material(report: FitReport, path: str | Path) -> None:
     InputError
         If the file cannot be written.
     """
-    material = report.best
-    constants = {
-        constant.name: f"{value!r} {constant.unit}" if constant.unit else value
-        for constant, value in zip(material.constants(), material.parameters.values(), strict=True)
-    }
-    text = yaml.safe_dump({"model": material.name, "constants": constants}, sort_keys=False)
+    text = material_yaml(report.best)
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:
@@ -60,7 +54,7 @@ def write_material(report: FitReport, path: str | Path) -> None:
 
 
 def write_fit_report(report: FitReport, folder: str | Path) -> Path:
-    """Write the fit as ``fit.json`` and, with its curves, as ``fit.html``; return the path of the latter.
+    """Write the fit as ``fit.json`` and as the page ``fit.html``; return the path of the latter.
 
     Raises
     ------
@@ -72,7 +66,6 @@ def write_fit_report(report: FitReport, folder: str | Path) -> Path:
     try:
         place.mkdir(parents=True, exist_ok=True)
         (place / "fit.json").write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        stress_strain(document).write_html(place / "fit.html", include_plotlyjs=True, full_html=True)
+        return write_fit_page(report, place / FILE_NAME)
     except OSError as error:
         raise InputError(f"the report cannot be written: {error.strerror}", file=place) from error
-    return place / "fit.html"

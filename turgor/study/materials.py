@@ -16,6 +16,7 @@ from turgor.materials import Hyperelastic, create, find_model
 from turgor.materials.fit import fit, parse_strain_range
 from turgor.materials.fit_result import FitReport
 from turgor.materials.library import find
+from turgor.study.specimen import SpecimenCase
 from turgor.study.validation import StrictModel, collected, invalid, under
 
 log = logger("study")
@@ -132,10 +133,21 @@ class FittedMaterial(_Compressible):
     strain_range: StrainRange | None = Field(
         default=None, pattern=r"^[^:]*:[^:]*$", description="strains from a to b, as 'a:b'"
     )
+    error: Literal["absolute", "relative"] = Field(default="absolute", description="how a residual counts")
+    weights: tuple[float, ...] | None = Field(default=None, description="one factor for each test")
+    stability: Literal["prefer", "require", "ignore"] = Field(default="prefer", description="of the fits")
+    specimen: SpecimenCase = Field(default=SpecimenCase(), description="what the files do not say")
 
     def fitted(self) -> FitReport:
         """Return the fit; raise InputError as :func:`turgor.materials.fit.fit` does."""
-        return fit(self.fit, self.models, strain_range=self.strain_range)
+        return fit(
+            [test for file in self.fit for test in self.specimen.read(file)],
+            self.models,
+            strain_range=self.strain_range,
+            error=self.error,
+            weights=self.weights,
+            stability=self.stability,
+        )
 
     def build(self, report: FitReport) -> Hyperelastic:
         """Return the recommended material of the fit with the volume change and density asked for here."""

@@ -16,6 +16,10 @@ class Progress(Protocol):
         """Tell a detail that the next one replaces, such as an iteration."""
         ...
 
+    def warn(self, text: str) -> None:
+        """Say what the user should know before going on."""
+        ...
+
     def advance(self, fraction: float, text: str) -> None:
         """Tell the part of the load that is reached and kept, 0 to 1, and what was reached."""
         ...
@@ -28,6 +32,9 @@ class Silent:
         """Do nothing."""
 
     def note(self, text: str) -> None:
+        """Do nothing."""
+
+    def warn(self, text: str) -> None:
         """Do nothing."""
 
     def advance(self, fraction: float, text: str) -> None:

@@ -23,7 +23,7 @@ from turgor.results.store import RunStore
 from turgor.results.summary import Summary, summarise
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import solve_path
-from turgor.study.build import check_names, check_sizes, system_of
+from turgor.study.build import check_names, check_sizes, doubts, system_of
 from turgor.study.case import Case, MeshCase
 from turgor.study.datafiles import copy_data, data_names, same_data
 from turgor.study.fitting import fit_document
@@ -135,6 +135,9 @@ class _Running:
             self.show.stage("fit")
         materials, fit = build_materials(self.case.materials)
         check_sizes(self.case, materials)
+        for text in doubts(self.case, materials):
+            log.warning(text)
+            self.show.warn(text)
         with self._resumed() if continues else nullcontext() as stored:
             mesh = stored.mesh if stored else self._meshed()
             self.show.stage("system")
