@@ -169,6 +169,23 @@ def test_an_unstable_material_is_told_of_before_the_mesh(small_tube: Path, tmp_p
     assert watch.warnings == []
 
 
+TABLE = "{type: plane, name: table, point: [0 mm, 0 mm, 40.2 mm], normal: [0, 0, -1], surface: tip-face}"
+
+
+@pytest.mark.usefixtures("unreported")
+def test_the_summary_tells_what_a_rigid_body_feels(small_tube: Path, tmp_path: Path) -> None:
+    case = load_case(small_tube, [f"contact.bodies=[{TABLE}]", "contact.self=true", "solver.steps=1"])
+    done = run(case, tmp_path / "run")
+    touch = done.summary["contact"]["table"]
+    assert touch["force_N"][2] > 0.1
+    assert abs(touch["force_N"][0]) < 1e-9
+    assert 0 < touch["overlap_per_wall"] < 0.01
+    assert 0 < touch["area_mm2"] <= np.pi * 9**2
+    assert done.summary["contact"]["self"]["area_mm2"] == 0.0
+    resumed = run(case, done.folder, resume=True)
+    assert resumed.summary["contact"]["table"]["force_N"] == pytest.approx(touch["force_N"])
+
+
 FIT = "materials.body={fit: 'soft rubber.csv', models: [yeoh-1, neo-hookean], poisson: 0.499}"
 
 

@@ -127,7 +127,10 @@ def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> 
 
 
 def _check_regions(names: Collection[str], mesh: Mesh) -> None:
+    others = set(mesh.regions) - set(names)
     for name in names:
+        if name == "body" and others:
+            continue  # it stands for the regions that are not named, whether or not one is called so
         check_name(name, mesh.regions, f"materials.{name}", "region")
     for region in mesh.regions:
         if region not in names and "body" not in names:

@@ -31,7 +31,7 @@ from turgor.study.machine import peak_memory_mb
 from turgor.study.materials import FittedMaterial, build_materials
 from turgor.study.progress import Progress, Silent
 from turgor.study.runlog import RunLog
-from turgor.study.states import Recorder, to_equilibrium
+from turgor.study.states import Recorder, standing, to_equilibrium
 from turgor.study.validation import under
 
 log = logger("study")
@@ -226,7 +226,9 @@ class _Running:
             wall_s=time.perf_counter() - self.begun,
             peak_memory_mb=peak_memory_mb(),
         )
-        return summary | {"facts": stop.facts} if stop else summary
+        last = store.last()
+        stands = standing(system, to_equilibrium(system, last).state) if last else {}
+        return summary | stands | ({"facts": stop.facts} if stop else {})
 
 
 def _load_text(name: str, value: float) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
+from turgor.fem.contact.term import Touch
 from turgor.fem.fields import von_mises
+from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.results.record import StepRecord
 from turgor.solver.newton import Equilibrium
@@ -45,6 +48,7 @@ def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: floa
             "stable": equilibrium.stable,
             "residual": float(equilibrium.residuals[-1]),
             "wall_s": wall_s,
+            "contact_penalty": state.penalty,
         },
     )
 
@@ -78,10 +82,44 @@ class Recorder:
         return made
 
 
+def standing(system: System, state: State) -> dict[str, Any]:
+    """Return how contacts and fibres stand in a state, in plain values; only what the system has.
+
+    Returns
+    -------
+    dict
+        ``contact``: by its name, area, overlap (also in parts of the wall behind it) and what a rigid body feels;
+        ``fibres``: by its curve, the largest tension and strain.
+    """
+    found: dict[str, Any] = {}
+    if system.contacts:
+        found["contact"] = {touch.name: _touch(touch) for touch in system.touches(state)}
+    if system.fibres:
+        found["fibres"] = {
+            embedded.fibre.curve: {
+                "largest_tension_N": float(embedded.tension(state.u).max()),
+                "largest_strain": float(embedded.strain(state.u).max()),
+            }
+            for embedded in system.fibres
+        }
+    return found
+
+
+def _touch(touch: Touch) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "area_mm2": touch.area,
+        "overlap_mm": touch.overlap,
+        "overlap_per_wall": touch.overlap_per_wall,
+    }
+    if touch.force is not None and touch.torque is not None:
+        facts |= {"force_N": list(touch.force), "torque_N_mm": list(touch.torque)}
+    return facts
+
+
 def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     """Return the equilibrium that a record was made of, as a start for the solver."""
     loads = np.array([record.loads[name] for name in system.load_names])
-    state = system.consistent(np.array(record.displacement), loads)
+    state = system.consistent(np.array(record.displacement), loads, record.solver["contact_penalty"])
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)
