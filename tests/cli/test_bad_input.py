@@ -80,6 +80,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "outputs-out-of-order.yaml": ("solver.outputs", "in order"),
     "pair-of-one.yaml": ("contact.pairs.0.1", "missing"),
     "plane-without-normal.yaml": ("contact.bodies.0.normal", "length 0"),
+    "plane-section.yaml": ("geometry.model", "can be meshed but not run", "a model in space"),
     "poisson-0.6.yaml": ("materials.body.poisson", "0.6", "below 0.5"),
     "pressure-of-1e9.yaml": ("loads.0.value", "times the shear modulus", "check both units"),
     "python-tag.yaml": ("line 4", "python/object/apply:os.system", "not allowed"),

@@ -98,6 +98,20 @@ def test_a_sheet_and_a_fibre_family_stiffen_the_tube(mesh: tg.Mesh, path: tg.Pat
     assert "sheets" in tg.Model(mesh, body=rubber, sheets=[paper]).inflate("1 kPa", steps=1).description
 
 
+def test_fibres_run_along_every_curve_unless_one_is_named() -> None:
+    tube = tg.FibreTube(length="50 mm", cap="8 mm", fibre_length="30 mm", tilt="0 deg", winding="both")
+    mesh = tube.mesh(size="12 mm", per_circle=6)
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    kevlar = {"youngs_modulus": "31 GPa", "diameter": "0.2 mm"}
+    free, one, both = (
+        tg.Model(mesh, body=rubber, fibres=fibres).inflate("5 kPa", steps=1).cavity_volume.magnitude[-1]
+        for fibres in ([], [kevlar | {"curve": "fibre-1"}], [kevlar])
+    )
+    assert both < one < free
+    with pytest.raises(InputError, match=r"fibres.0.curve: the actuator has no such curve.*fibre-1, fibre-2"):
+        tg.Model(mesh, body=rubber, fibres=[kevlar | {"curve": "fibre"}])
+
+
 def test_what_the_mesh_does_not_have_is_refused(mesh: tg.Mesh) -> None:
     rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})
     with pytest.raises(InputError, match=r"materials.bodi: the actuator has no such region.*'body'"):

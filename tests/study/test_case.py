@@ -9,10 +9,14 @@ import pytest
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
+from turgor.geometry import cad
+from turgor.geometry.tube import CappedTube
 from turgor.materials import create
 from turgor.study.build import check_sizes
 from turgor.study.case import Case, load_case
+from turgor.study.datafiles import data_names
 from turgor.study.materials import build_materials
+from turgor.study.run import mesh_case
 from turgor.study.setup import Setup
 
 HELD = [{"type": "clamped", "surface": "mount"}]
@@ -141,6 +145,26 @@ def test_the_bounds_of_a_pressure(small_tube: Path, value: str, refused: bool) -
             check_sizes(case, materials)
     else:
         check_sizes(case, materials)
+
+
+STEP = """\
+geometry: {template: step, file: tube.step, mount: {normal: [0, 0, -1]}, tip_face: {normal: [0, 0, 1]}}
+materials: {body: {model: neo-hookean, constants: {C10: 0.05 MPa}}}
+mesh: {size: 6 mm}
+supports: [{type: clamped, surface: mount}]
+loads: [{type: pressure, value: 5 kPa}]
+"""
+
+
+def test_a_shape_may_come_from_a_step_file(tmp_path: Path) -> None:
+    with cad.session("export") as gmsh:
+        CappedTube(inner_radius="6 mm", wall="3 mm", length="40 mm", cap="6 mm").draw()
+        gmsh.write(str(tmp_path / "tube.step"))
+    (tmp_path / "case.yaml").write_text(STEP, encoding="utf-8")
+    case = load_case(tmp_path / "case.yaml")
+    assert data_names(case) == {tmp_path / "tube.step": "data/tube.step"}
+    assert "file: data/tube.step" in case.to_yaml(data_names(case))
+    assert {"mount", "tip-face", "cavity"} <= mesh_case(case).surfaces.keys()
 
 
 def test_the_schema_names_every_key_and_template() -> None:

@@ -64,8 +64,13 @@ class Setup(StrictModel):
         Raises
         ------
         InputError
-            As :meth:`check` and :class:`System` do.
+            If the mesh is a plane section, and as :meth:`check` and :class:`System` do.
         """
+        if mesh.dimension != 3:
+            # The mechanics know plane sections; the store, the measures and the report of a run do not.
+            raise InputError(
+                "a plane section can be meshed but not run", key="geometry.model", expected="a model in space"
+            )
         self.check(mesh)
         return System(
             mesh,
