@@ -129,11 +129,12 @@ def mesh_of(case: Case, most_cells: int) -> Mesh:
     actuator = case.actuator()
     size = case.size_factor * actuator.default_size
     mesh = generate(actuator, size, per_circle=case.per_circle)
-    for _ in range(6):
-        if mesh.n_cells <= most_cells:
-            break
+    while mesh.n_cells > most_cells:
         size *= COARSENING
-        mesh = generate(actuator, size, per_circle=min(case.per_circle, 6))
+        coarser = generate(actuator, size, per_circle=min(case.per_circle, 6))
+        if coarser.n_cells >= mesh.n_cells:
+            break
+        mesh = coarser
     return spoilt(mesh, case.ugliness, case.seed) if case.ugliness else mesh
 
 

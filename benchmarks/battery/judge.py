@@ -15,7 +15,7 @@ from turgor.solver.newton import Equilibrium, NewtonOptions
 from turgor.solver.path import LimitPressureError
 from turgor.solver.volume import VolumeWalk
 
-STEP = 1e-4
+STEP = 2e-5
 """Size of the finite difference, in parts of the shortest edge."""
 
 STATIONARY = 1e-4

@@ -90,7 +90,7 @@ def judged(claimed: str, seen: Look) -> str:
         return claimed
     if seen.drucker_margin < 0.0:
         return "material"
-    return "mesh" if seen.smallest_det_F < DISTORTED else "failed"
+    return "mesh" if seen.smallest_jacobian < DISTORTED else "failed"
 
 
 if __name__ == "__main__":
