@@ -14,6 +14,7 @@ from turgor.solver.control import AirAmount, ArcLength, FixedConjugate
 from turgor.solver.linear import make_linear_solver
 from turgor.solver.newton import NewtonOptions, find_equilibrium
 from turgor.solver.path import solve_path
+from turgor.solver.volume import VolumeWalk
 
 FULL = 0.04
 
@@ -55,6 +56,16 @@ def test_a_closed_amount_of_air_holds_the_sphere_beyond_its_limit(sphere, times)
     pressure = float(state.loads[0])
     assert (pressure + 0.101325) * system.cavities[0].volume(state.u) == pytest.approx(amounts[-1], rel=1e-6)
     assert pressure == pytest.approx(pressure_at(system, state), rel=6e-3)
+
+
+def test_a_state_that_needs_no_iteration_still_has_its_compliance(sphere):
+    system, linear = sphere
+    start = solve_path(system, [0.5])[0]
+    walk = VolumeWalk(system, linear, start, 1.0, NewtonOptions())
+    found = walk.at(system.conjugate(start.state))
+    assert found.iterations == 0
+    assert found.compliance == pytest.approx(walk.here.compliance, rel=1e-6)
+    assert found.compliance > 0
 
 
 def test_arc_length_walks_over_the_top(sphere):

@@ -102,7 +102,9 @@ class VolumeWalk:
                 guess = predicted
                 fraction += reach * (here.fraction - before.fraction)
         control = FixedConjugate(conjugate)
-        return find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
+        found = find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
+        # A prediction that needed no iteration has not been asked for its compliance yet.
+        return found if found.compliance is not None else self._with_compliance(found)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between two equilibria of the walk whose compliances differ in sign.

@@ -27,7 +27,7 @@ class Model:
         The actuator.
     supports
         What holds it, each as in a case file: ``{"type": "clamped", "surface": "mount"}``. Left out, the surface
-        ``mount`` is clamped and the surface ``symmetry``, if there is one, slides.
+        ``mount`` is clamped and the surfaces ``symmetry`` or ``symmetry-…``, if there are any, slide.
     loads
         What acts on it besides the pressure, each as in a case file: ``{"type": "gravity"}``.
     contact
@@ -129,8 +129,8 @@ class Model:
 
 
 def _default_supports(mesh: Mesh) -> list[dict[str, str]]:
-    symmetry = [{"type": "sliding", "surface": "symmetry"}] if "symmetry" in mesh.surfaces else []
-    return [{"type": "clamped", "surface": "mount"}, *symmetry]
+    planes = [name for name in mesh.surfaces if name == "symmetry" or name.startswith("symmetry-")]
+    return [{"type": "clamped", "surface": "mount"}, *({"type": "sliding", "surface": name} for name in planes)]
 
 
 def _cavities(mesh: Mesh) -> list[str]:
