@@ -173,19 +173,26 @@ def find_equilibrium(
             du += pending
         change = 0.0
         if control is not None:
-            direction = system.load_direction(state)
-            response = system.nodal(linear.solve(-system.free_part(direction)))
-            compliance = -float(np.vdot(direction, response))
-            value, by_conjugate, by_fraction = control.gap(system.conjugate(state), fraction)
-            value -= by_conjugate * float(np.vdot(direction, du))
-            change = -value / (by_conjugate * compliance + by_fraction)
-            du += change * response
+            du, change, compliance = _controlled(system, linear, state, du, fraction, control)
         state, damping = _advanced(system, state, du, residuals, search=control is None and not moving)
         # What a shortened step left of the given displacements is imposed by the next one.
         pending = (1.0 - damping) * pending
         moving = moving and damping < 1.0
         fraction += damping * change
         state = state.with_loads(system.loads_at(fraction))
+
+
+def _controlled(
+    system: System, linear: LinearSolver, state: State, du: Floats, fraction: float, control: Control
+) -> tuple[Floats, float, float]:
+    """Return the step with which the linearised control holds too, the change of the load fraction, the compliance."""
+    direction = system.load_direction(state)
+    response = system.nodal(linear.solve(-system.free_part(direction)))
+    compliance = -float(np.vdot(direction, response))
+    value, by_conjugate, by_fraction = control.gap(system.conjugate(state), fraction)
+    value -= by_conjugate * float(np.vdot(direction, du))
+    change = -value / (by_conjugate * compliance + by_fraction)
+    return du + change * response, change, compliance
 
 
 def _relative_gap(control: Control, conjugate: float, fraction: float) -> float:
