@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-EXIT_REACHED = 0
 EXIT_BAD_INPUT = 2
 EXIT_STOPPED_SHORT = 3
 

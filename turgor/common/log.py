@@ -9,6 +9,7 @@ LOGGER_NAME = "turgor"
 
 def logger(room: str) -> logging.Logger:
     """Return the logger of one room (``logger("solver")``); silent unless somebody listens."""
-    log = logging.getLogger(f"{LOGGER_NAME}.{room}")
-    logging.getLogger(LOGGER_NAME).addHandler(logging.NullHandler())
-    return log
+    root = logging.getLogger(LOGGER_NAME)
+    if not root.handlers:
+        root.addHandler(logging.NullHandler())
+    return root.getChild(room)

@@ -117,7 +117,6 @@ class Pardiso(LinearSolver):
         control[0] = 1  # the entries below, not the defaults
         control[1] = 3  # nested dissection, in parallel
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
-        control[17] = -1  # report the number of factor entries
         control[20] = 1  # Bunch–Kaufman pivots
         control[34] = 1  # indices from zero
         self._control = control
@@ -144,11 +143,6 @@ class Pardiso(LinearSolver):
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues."""
         return int(self._control[22])
-
-    @property
-    def factor_memory_MB(self) -> float:
-        """Memory of the factors, MB, as PARDISO reports it after the analysis."""
-        return float(max(self._control[14], self._control[15] + self._control[16])) / 1024
 
     def _call(self, phase: int, right: Floats | None = None, solution: Floats | None = None) -> None:
         error = _pardiso_call(

@@ -124,12 +124,6 @@ class Skin:
         start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=len(self.faces)))])
         return start.astype(np.intp), second[order].astype(np.int32)
 
-    def touching_distance(self, x: Floats, first: Ints, second: Ints) -> NDArray[np.bool_]:
-        """Whether the balls around pairs of faces ``(n,)`` meet at positions `x`."""
-        centre, _, radius = _balls(x, self.faces)
-        between = np.linalg.norm(centre[first] - centre[second], axis=1)
-        return np.asarray(between <= radius[first] + radius[second])
-
     def _neighbours(self, first: Ints, second: Ints) -> NDArray[np.bool_]:
         corners = self.faces[:, :3]
         shared = corners[first][:, :, None] == corners[second][:, None, :]
