@@ -12,6 +12,7 @@ from turgor.geometry.honeycomb import Honeycomb
 from turgor.geometry.membrane import Membrane
 from turgor.geometry.pneunet import PneuNet
 from turgor.geometry.reinforced_tube import ReinforcedTube
+from turgor.geometry.section import PlaneSection
 from turgor.geometry.tube import CappedTube
 
 NAMES = list(templates())
@@ -125,3 +126,10 @@ IMPOSSIBLE = {
 def test_impossible_shapes_are_refused_by_name(kind, parameters, key):
     with pytest.raises(InputError, match=f"^{key}: "):
         kind(**parameters)
+
+
+def test_plane_shapes_say_what_they_stand_for():
+    assert Bellows(model="axisymmetric").section == PlaneSection("axisymmetric", None)
+    assert Honeycomb(model="plane", depth="12 mm").section == PlaneSection("plane-strain", 12.0)
+    assert Bellows(model="quarter").section is None
+    assert all(actuator(name).section is None for name in NAMES)

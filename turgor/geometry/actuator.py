@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 
 from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
+from turgor.geometry.section import PlaneSection
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -107,6 +108,11 @@ class Actuator(BaseModel, ABC):
             if is_length and size != 0.0 and not SMALLEST <= size <= LARGEST:
                 expected = f"{SMALLEST:g} mm to {LARGEST:g} mm"
                 raise InputError("no actuator has this size", key=name, value=f"{size:g} mm", expected=expected)
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """What the drawing stands for if it is plane; None for a body in space."""
+        return None
 
     @property
     @abstractmethod

@@ -12,6 +12,7 @@ from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 from turgor.geometry.path import Piece, Step, offset_path
+from turgor.geometry.section import PlaneSection
 
 _ANNEX = "San Martin Lopez, Flexible TPU pneumatic actuator simulation, annex 1"
 _ASSUMED = "assumed"
@@ -46,6 +47,11 @@ class Bellows(Actuator):
     model: Literal["full", "quarter", "axisymmetric"] = parameter(
         "full", "the whole, the quarter x, y ≥ 0, or the section in the plane of radius x and height z", _ASSUMED
     )
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """One half of the section through the axis, turned about it; None for the whole and the quarter."""
+        return PlaneSection("axisymmetric") if self.model == "axisymmetric" else None
 
     @property
     def default_size(self) -> float:

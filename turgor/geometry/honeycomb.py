@@ -11,6 +11,7 @@ from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 from turgor.geometry.path import Piece, rounded_polygon
+from turgor.geometry.section import PlaneSection
 
 _PAPER = "Design and Analysis of a Hyperelastic Pneumatic Honeycomb Network Made of Ecoflex 00-35, section 3.1"
 _ASSUMED = "assumed"
@@ -51,6 +52,11 @@ class Honeycomb(Actuator):
         "the whole, the half y ≥ 0 with the surface 'symmetry', or the section in the plane of x and z",
         _ASSUMED,
     )
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """A slice as thick as the depth, in plane strain; None for the whole and the half."""
+        return PlaneSection("plane-strain", self.depth) if self.model == "plane" else None
 
     @property
     def default_size(self) -> float:
