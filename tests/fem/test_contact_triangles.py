@@ -13,7 +13,7 @@ from turgor.fem.contact.spec import RigidContact
 from turgor.fem.rigid import Box
 from turgor.fem.supports import Clamped
 from turgor.fem.system import System
-from turgor.fem.triangles import TriangleBody
+from turgor.geometry.imported.triangles import TriangleBody
 from turgor.mesh.structured import box
 from turgor.solver.path import solve_path
 

@@ -1,1 +1,1 @@
-"""Solids that another program drew: STEP files, with faces selected by rules."""
+"""Solids that other programs drew: STEP and STL files, with faces and openings selected by rules."""

@@ -1,4 +1,4 @@
-"""Rigid bodies of flat triangles, as STL files hold them: signed distance by a tree of boxes."""
+"""Bodies of flat triangles, as STL files hold them: signed distance by a tree of boxes."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class TriangleBody:
         return np.asarray(self._middle)
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the signed distance and its derivatives; see :meth:`turgor.fem.rigid.RigidBody.distance`."""
+        """Return the signed distance ``(n,)``, mm, negative inside, its gradient and its second derivative."""
         triangle, feature, nearest = np.empty(len(x), np.int64), np.empty(len(x), np.int64), np.empty_like(x)
         _find_nearest(np.ascontiguousarray(x), self._corners, *self._tree, triangle, feature, nearest)
         outward = self._normals[triangle, feature]
