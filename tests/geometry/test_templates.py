@@ -104,6 +104,7 @@ IMPOSSIBLE = {
     "mount wider than the bottom": (Bellows, {"mount_radius": "9 mm"}, "mount_radius"),
     "inlet wider than the chamber": (Membrane, {"inlet_diameter": "2.5 mm"}, "inlet_diameter"),
     "membrane thicker than the zone": (Membrane, {"membrane": "5 mm"}, "membrane"),
+    "quarter of many segments": (Membrane, {"model": "quarter"}, "model"),
     "flat longer than the cell": (Honeycomb, {"web_length": "55 mm"}, "web_length"),
     "end walls meet": (Honeycomb, {"end_wall": "10 mm"}, "end_wall"),
     "cell walls meet": (Honeycomb, {"thickness": "9.5 mm"}, "thickness"),
@@ -131,5 +132,7 @@ def test_impossible_shapes_are_refused_by_name(kind, parameters, key):
 def test_plane_shapes_say_what_they_stand_for():
     assert Bellows(model="axisymmetric").section == PlaneSection("axisymmetric", None)
     assert Honeycomb(model="plane", depth="12 mm").section == PlaneSection("plane-strain", 12.0)
+    assert Membrane(model="plane").section == PlaneSection("plane-strain", 20.0)
+    assert CappedTube(model="axisymmetric").section == PlaneSection("axisymmetric", None)
     assert Bellows(model="quarter").section is None
     assert all(actuator(name).section is None for name in NAMES)

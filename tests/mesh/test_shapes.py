@@ -9,14 +9,20 @@ from hypothesis import strategies as st
 
 from turgor.common.errors import InputError
 from turgor.geometry.catalogue import actuator, templates
+from turgor.mesh.cells import determinants, jacobians
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.generate import generate
 from turgor.mesh.tet10 import jacobian_coefficients
 
+SHARES = {"full": 1.0, "half": 0.5, "quarter": 0.25}
+
 
 def tube_volumes(tube):
-    outer, air = tube.inner_radius + tube.wall, math.pi * tube.inner_radius**2 * (tube.length - 2 * tube.cap)
-    return air, math.pi * outer**2 * tube.length - air
+    inner, outer, room = tube.inner_radius, tube.inner_radius + tube.wall, tube.length - 2 * tube.cap
+    if tube.model == "axisymmetric":
+        return inner * room, outer * tube.length - inner * room
+    share = math.pi * SHARES[tube.model]
+    return share * inner**2 * room, share * (outer**2 * tube.length - inner**2 * room)
 
 
 def pneunet_volumes(finger):
@@ -82,17 +88,18 @@ def bellows_volumes(bellows):
     if bellows.model == "axisymmetric":
         (r0, z0), (r1, z1) = np.vstack(profile)[:-1].T, np.vstack(profile)[1:].T
         return ((r0 + r1) / 2 * (z1 - z0)).sum() + inlet * w, w * sum(length for length, _ in pieces)
-    share = 0.25 if bellows.model == "quarter" else 1.0
+    share = SHARES[bellows.model]
     return share * air, share * solid
 
 
 def membrane_volumes(sheet):
-    n = sheet.segments
-    chamber = sheet.chamber_width * sheet.chamber_length * sheet.zone
-    air = n * (chamber + math.pi / 4 * sheet.inlet_diameter**2 * sheet.base)
-    width = n * sheet.chamber_width + (n - 1) * sheet.spacing + 2 * sheet.border
-    block = width * (sheet.chamber_length + 2 * sheet.border) * (sheet.base + sheet.zone + sheet.membrane)
-    return air, block - air
+    n, flat = sheet.segments, sheet.model == "plane"
+    length, width = sheet.chamber_length, n * sheet.chamber_width + (n - 1) * sheet.spacing + 2 * sheet.border
+    bore = sheet.inlet_diameter if flat else math.pi / 4 * sheet.inlet_diameter**2
+    air = n * (sheet.chamber_width * sheet.zone * (1.0 if flat else length) + bore * sheet.base)
+    block = width * (1.0 if flat else length + 2 * sheet.border) * (sheet.base + sheet.zone + sheet.membrane)
+    share = SHARES.get(sheet.model, 1.0)
+    return share * air, share * (block - air)
 
 
 def honeycomb_volumes(comb):
@@ -174,12 +181,19 @@ def assert_exact(shape, mesh, tolerance):
     assert mesh.volume() == pytest.approx(solid, rel=tolerance)
 
 
-SECTIONS = [("bellows", {"model": "axisymmetric"}), ("honeycomb", {"model": "plane"})]
+OTHER_MODELS = [
+    ("bellows", {"model": "axisymmetric"}),
+    ("honeycomb", {"model": "plane"}),
+    ("membrane", {"model": "plane"}),
+    ("membrane", {"model": "quarter", "segments": 1}),
+    ("tube", {"model": "axisymmetric"}),
+    ("tube", {"model": "half"}),
+]
 
 
 @pytest.fixture(
     scope="module",
-    params=[(name, SMALL.get(name, {})) for name in templates()] + SECTIONS,
+    params=[(name, SMALL.get(name, {})) for name in templates()] + OTHER_MODELS,
     ids=lambda choice: "-".join([choice[0], *map(str, choice[1].values())]),
 )
 def small(request):
@@ -204,13 +218,27 @@ def test_the_body_is_held_somewhere_and_seen_somewhere(small):
     assert mesh.marker("tip")[0] not in mesh.surface_nodes("mount")
 
 
-def test_the_axis_of_a_section_is_its_axis():
+@pytest.mark.parametrize("name", ["bellows", "tube"])
+def test_a_section_turned_about_its_axis_is_the_body(name):
+    shape = actuator(name, model="axisymmetric")
+    mesh = generate(shape)
+    assert (mesh.cell_type, shape.section.kind) == ("tri6", "axisymmetric")
+    assert (mesh.points[mesh.surface_nodes("axis"), 0] == 0.0).all()
+    assert mesh.points[:, 0].min() == 0.0
+    nodes, cell = mesh.points[mesh.cells], mesh.cell
+    radius = nodes[:, :, 0] @ cell.shape_at_quadrature.T
+    turned = 2 * math.pi * (radius * determinants(jacobians(nodes, cell))) @ cell.weights
+    assert turned.sum() == pytest.approx(EXACT[name](shape.changed(model="full"))[1], rel=1e-4)
+
+
+def test_the_parts_of_a_section_are_as_long_as_they_should_be():
     mesh = generate(actuator("bellows", model="axisymmetric"))
-    assert mesh.cell_type == "tri6"
-    assert (np.abs(mesh.points[mesh.surface_nodes("axis"), 0]) < 1e-9).all()
-    assert mesh.points[:, 0].min() > -1e-9
     assert mesh.surface_area("axis") == pytest.approx(1.23)
     assert mesh.surface_area("mount") == pytest.approx(5.0 - 1.62)
+    mesh = generate(actuator("membrane", model="plane", segments=2))
+    assert mesh.surface_area("membrane-face") == pytest.approx(2 * 2.5 + 2.0 + 2 * 3.0)
+    assert mesh.surface_area("mount") == pytest.approx(13.0 - 2 * 2.0)
+    assert mesh.surface_area("cavity-1") == pytest.approx(2 * (2.0 + 4.0) + 2.5 + 0.5)
 
 
 def test_symmetry_planes_hold_all_their_nodes(small):
@@ -350,8 +378,10 @@ COUNTS = {
     "fibre-tube": {"fibres": (1, 3)},
 }
 CHOICES = {
+    "tube": ("model", ("full", "half", "quarter", "axisymmetric")),
     "pneunet": ("symmetric", (False, True)),
-    "bellows": ("model", ("quarter", "axisymmetric")),
+    "bellows": ("model", ("half", "quarter", "axisymmetric")),
+    "membrane": ("model", ("full", "half", "quarter", "plane")),
     "honeycomb": ("model", ("full", "half", "plane")),
     "reinforced-tube": ("symmetric", (False, True)),
 }

@@ -12,7 +12,7 @@ from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
 from turgor.geometry.path import Piece, Step, offset_path
-from turgor.geometry.section import PlaneSection
+from turgor.geometry.section import CUTS, TURN, PlaneSection
 
 _ANNEX = "San Martin Lopez, Flexible TPU pneumatic actuator simulation, annex 1"
 _ASSUMED = "assumed"
@@ -25,9 +25,9 @@ class Bellows(Actuator):
     """A body of revolution around z, standing on the plane z = 0, where the inlet opens.
 
     Surfaces ``mount`` (the ring around the inlet), ``tip-face`` (the flat top), ``outer``, ``cavity`` (inside and wall
-    of the inlet, whose rim lies in the plane z = 0, so that the volume is closed); of the quarter model ``symmetry-x``
-    and ``symmetry-y`` (the cuts x = 0 and y = 0), of the axisymmetric one ``axis``; region ``body``; markers ``base``
-    (on the inlet's rim) and ``tip`` (centre of the top).
+    of the inlet, whose rim lies in the plane z = 0, so that the volume is closed); of the half model ``symmetry`` (the
+    cut y = 0), of the quarter ``symmetry-x`` and ``symmetry-y`` (the cuts x = 0 and y = 0), of the axisymmetric one
+    ``axis``; region ``body``; markers ``base`` (on the inlet's rim) and ``tip`` (centre of the top).
     """
 
     template: ClassVar[str] = "bellows"
@@ -44,13 +44,13 @@ class Bellows(Actuator):
     flank_angle: Angle = parameter("16.26 deg", "slope of the flanks against the horizontal", f"{_ANNEX}: E")
     inlet_radius: PositiveLength = parameter("1.62 mm", "radius of the inlet in the bottom", f"{_ANNEX}: half of B")
     mount_radius: PositiveLength = parameter("5 mm", "outer radius of the ring that is held", _ASSUMED)
-    model: Literal["full", "quarter", "axisymmetric"] = parameter(
-        "full", "the whole, the quarter x, y ≥ 0, or the section in the plane of radius x and height z", _ASSUMED
+    model: Literal["full", "half", "quarter", "axisymmetric"] = parameter(
+        "full", "the whole, the half y ≥ 0, the quarter x, y ≥ 0, or the section of radius and height", _ASSUMED
     )
 
     @property
     def section(self) -> PlaneSection | None:
-        """One half of the section through the axis, turned about it; None for the whole and the quarter."""
+        """One half of the section through the axis, turned about it; None for a model in space."""
         return PlaneSection("axisymmetric") if self.model == "axisymmetric" else None
 
     @property
@@ -134,30 +134,18 @@ class Bellows(Actuator):
                 Piece(inside[0].start, outside[0].start),
             ]
         )
+        tip, base = np.array([[0.0, 0.0, self.height]]), np.array([[self.inlet_radius, 0.0, 0.0]])
         if self.model == "axisymmetric":
-            return self._section(section)
-        turn = 0.5 * math.pi if self.model == "quarter" else 2.0 * math.pi
-        swept = occ.revolve([(2, section)], 0, 0, 0, 0, 0, 1, turn)
+            face = cad.with_points(section, tip, 2)
+            markers = {"base": base[:, [0, 2]], "tip": tip[:, [0, 2]]}
+            return Shape({"body": [face]}, self._surfaces(cad.boundary([face], 2), 2), markers, dimension=2)
+        swept = occ.revolve([(2, section)], 0, 0, 0, 0, 0, 1, TURN[self.model])
         occ.remove([(2, section)])
-        tip = np.array([[0.0, 0.0, self.height]])
         body = cad.with_points(next(tag for dimension, tag in swept if dimension == 3), tip)
-        surfaces = self._surfaces(cad.boundary([body]))
-        base = np.array([[self.inlet_radius, 0.0, 0.0]])
-        return Shape(regions={"body": [body]}, surfaces=surfaces, markers={"base": base, "tip": tip})
+        return Shape({"body": [body]}, self._surfaces(cad.boundary([body])), {"base": base, "tip": tip})
 
-    def _surfaces(self, faces: list[int]) -> dict[str, list[int]]:
-        cuts = {f"symmetry-{axis}": cad.faces_in_plane(faces, axis, 0.0) for axis in "xy" if self.model == "quarter"}
-        return self._named(faces, cuts, 3)
-
-    def _section(self, face: int) -> Shape:
-        """Name the section itself, of which only the half x ≥ 0 is there."""
-        tip, base = np.array([[0.0, self.height]]), np.array([[self.inlet_radius, 0.0]])
-        face = cad.with_points(face, [[0.0, 0.0, self.height]], 2)
-        edges = cad.boundary([face], 2)
-        named = self._named(edges, {"axis": cad.faces_in_plane(edges, "x", 0.0, 2)}, 2)
-        return Shape({"body": [face]}, named, {"base": base, "tip": tip}, dimension=2)
-
-    def _named(self, faces: list[int], cuts: dict[str, list[int]], dimension: int) -> dict[str, list[int]]:
+    def _surfaces(self, faces: list[int], dimension: int = 3) -> dict[str, list[int]]:
+        cuts = {name: cad.faces_in_plane(faces, axis, 0.0, dimension) for name, axis in CUTS[self.model].items()}
         bottom = cad.faces_in_plane(faces, "z", 0.0, dimension)
         cut = {face for tags in cuts.values() for face in tags}
         rest = [face for face in faces if face not in cut and face not in bottom]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -59,10 +59,9 @@ def prism(corners: Sequence[tuple[float, float, float]], extent: tuple[float, fl
     return sweep(int(draw.addPlaneSurface([draw.addCurveLoop(edges)])), extent)
 
 
-def cylinder(low: float, high: float, radius: float, half: bool = False) -> tuple[int, int]:
-    """Draw a cylinder around z between two heights, or its half y ≥ 0; return it as (dimension, tag)."""
-    angle = math.pi if half else 2.0 * math.pi
-    return 3, int(occ().addCylinder(0, 0, low, 0, 0, high - low, radius, angle=angle))
+def cylinder(low: float, high: float, radius: float, turn: float = 2.0 * math.pi) -> tuple[int, int]:
+    """Draw a cylinder around z between two heights, of a part of a `turn` from x to y; return (dimension, tag)."""
+    return 3, int(occ().addCylinder(0, 0, low, 0, 0, high - low, radius, angle=turn))
 
 
 def plane_face(*outlines: Sequence[Piece]) -> int:
@@ -143,20 +142,33 @@ def skins(faces: Collection[int], dimension: int = 3) -> list[list[int]]:
     return sorted(groups, key=lambda group: _extent(dimension - 1, group), reverse=True)
 
 
-def named_skin(faces: Collection[int], axis: str, length: float, symmetric: bool = False) -> dict[str, list[int]]:
+def named_skin(
+    faces: Collection[int], axis: str, length: float, cuts: Mapping[str, str], dimension: int = 3
+) -> dict[str, list[int]]:
     """Name the boundary of a solid with one cavity whose end faces are the planes 0 and `length` along `axis`.
+
+    Parameters
+    ----------
+    faces
+        The whole boundary.
+    axis, length
+        Where the end faces lie.
+    cuts
+        Name → axis of each cut through the solid, which lies in the plane through the origin across that axis.
+    dimension
+        2 for the edges of a face.
 
     Returns
     -------
     dict
-        ``mount``, ``tip-face``, ``outer``, ``cavity`` and, for a half that ends in the plane y = 0, ``symmetry``.
+        ``mount``, ``tip-face``, ``outer``, ``cavity`` and the cuts by their names.
     """
-    symmetry = faces_in_plane(faces, "y", 0.0) if symmetric else []
-    outside, cavity = skins([face for face in faces if face not in symmetry])
-    mount, tip = (faces_in_plane(outside, axis, place) for place in (0.0, length))
+    named_cuts = {name: faces_in_plane(faces, across, 0.0, dimension) for name, across in cuts.items()}
+    cut = {face for tags in named_cuts.values() for face in tags}
+    outside, cavity = skins([face for face in faces if face not in cut], dimension)
+    mount, tip = (faces_in_plane(outside, axis, place, dimension) for place in (0.0, length))
     outer = [face for face in outside if face not in mount + tip]
-    named = {"mount": mount, "tip-face": tip, "outer": outer, "cavity": cavity}
-    return {**named, "symmetry": symmetry} if symmetric else named
+    return {"mount": mount, "tip-face": tip, "outer": outer, "cavity": cavity, **named_cuts}
 
 
 def with_points(volume: int, points: Any, dimension: int = 3) -> int:

@@ -88,7 +88,7 @@ class FibreTube(Actuator):
         tags = [tag for piece in regions.values() for tag in piece]
         return Shape(
             regions=regions,
-            surfaces=cad.named_skin(cad.boundary(tags), "z", self.length),
+            surfaces=cad.named_skin(cad.boundary(tags), "z", self.length, {}),
             markers={"base": ends[:1], "tip": ends[1:], "centreline": ends + np.array([outside, 0.0, 0.0])},
             curves=self._curves(),
         )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import itertools
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
-from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.path import polygon
+from turgor.geometry.section import CUTS, PlaneSection
 
 _THESIS = "San Martin Lopez, Flexible TPU pneumatic actuator simulation, section 2.2"
 _ASSUMED = "assumed"
@@ -21,9 +24,10 @@ class Membrane(Actuator):
     A chamber with its inlet is a T: the pressure acts on its walls and on the inlet, which opens in the plane z = 0.
 
     Regions ``base``, ``body`` (the zone) and ``membrane``; surfaces ``mount`` (the bottom), ``membrane-face`` (the
-    top), ``outer`` (the sides) and ``cavity``, or ``cavity-1``, ``cavity-2``, … along x if there are several; markers
-    ``tip`` (on the middle of the membrane over the middle chamber), ``centreline`` (from end to end of that chamber)
-    and ``base`` (corner of the bottom).
+    top), ``outer`` (the sides), ``cavity``, or ``cavity-1``, ``cavity-2``, … along x if there are several, and the cuts
+    ``symmetry`` (y = 0, of the half model) or ``symmetry-x`` and ``symmetry-y`` (of the quarter); markers ``tip`` (on
+    the middle of the membrane over the middle chamber), ``centreline`` (along that chamber to its far end, from its
+    near end or the cut; none in the plane) and ``base`` (corner of the bottom).
     """
 
     template: ClassVar[str] = "membrane"
@@ -38,10 +42,21 @@ class Membrane(Actuator):
     base: PositiveLength = parameter("2 mm", "thickness of the base", _THESIS)
     inlet_diameter: PositiveLength = parameter("2 mm", "bore through the base under each chamber's middle", _THESIS)
 
+    model: Literal["full", "half", "quarter", "plane"] = parameter(
+        "full",
+        "the whole, the half y ≥ 0, the quarter x, y ≥ 0 of a single segment, or the section across the chambers",
+        _ASSUMED,
+    )
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """A slice as thick as the chambers are long, in plane strain, where the bores are slots; or None in space."""
+        return PlaneSection("plane-strain", self.chamber_length) if self.model == "plane" else None
+
     @property
     def default_size(self) -> float:
-        """One element through the base, the walls and the border."""
-        return float(min(self.base, self.zone, self.spacing, self.border))
+        """One element through the base, the walls and the border; four in the section, where they cost little."""
+        return float(min(self.base, self.zone, self.spacing, self.border) / (4.0 if self.model == "plane" else 1.0))
 
     def check(self) -> None:
         """Raise InputError if the inlet does not fit under the chamber, or the membrane is no membrane."""
@@ -54,25 +69,72 @@ class Membrane(Actuator):
         if self.membrane > self.zone:
             value, expected = f"{self.membrane:g} mm", f"at most {self.zone:g} mm"
             raise InputError("the membrane is thicker than the zone", key="membrane", value=value, expected=expected)
-
-    @property
-    def _pitch(self) -> float:
-        return float(self.chamber_width + self.spacing)
-
-    def _middles(self) -> list[float]:
-        """Return the x of each chamber's middle; the block is centred on x = y = 0."""
-        return [(number - 0.5 * (self.segments - 1)) * self._pitch for number in range(self.segments)]
+        if self.model == "quarter" and self.segments != 1:
+            expected = "a single segment, or the model 'half'"
+            raise InputError("the quarter is one of a single segment", key="model", value="quarter", expected=expected)
 
     def draw(self) -> Shape:
         """Draw three layers, the middle one less the chambers and the base less the inlets."""
         occ = cad.occ()
-        half = 0.5 * (self.segments * self._pitch - self.spacing) + self.border
+        dimension = 2 if self.model == "plane" else 3
+        layers = self._faces() if self.model == "plane" else self._solids()
+        markers = self._markers()
+        stops = [occ.addPoint(*place) for place in markers.get("centreline", markers["tip"])]
+        marked = [(1, occ.addLine(*pair)) for pair in itertools.pairwise(stops)] or [(0, stops[0])]
+        owners = [name for name, entities in layers.items() for _ in entities]
+        _, pieces = occ.fragment([entity for entities in layers.values() for entity in entities], marked)
+        occ.synchronize()
+        regions: dict[str, list[int]] = {name: [] for name in layers}
+        for name, piece in zip(owners, pieces, strict=False):
+            regions[name] += [tag for _, tag in piece]
+        return Shape(
+            regions=regions,
+            surfaces=self._surfaces([tag for tags in regions.values() for tag in tags], dimension),
+            markers={name: line[:, [0, 2]] if dimension == 2 else line for name, line in markers.items()},
+            sizes=self._sizes(),
+            dimension=dimension,
+        )
+
+    def _middles(self) -> list[float]:
+        """Return the x of each chamber's middle; the block is centred on x = y = 0."""
+        pitch = self.chamber_width + self.spacing
+        return [(number - 0.5 * (self.segments - 1)) * pitch for number in range(self.segments)]
+
+    @property
+    def _levels(self) -> list[float]:
+        """Heights of the layers' faces."""
+        return [0.0, self.base, self.base + self.zone, self.base + self.zone + self.membrane]
+
+    @property
+    def _corners(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner of what is drawn of the block."""
+        half = self._middles()[-1] + 0.5 * self.chamber_width + self.border
         side = 0.5 * self.chamber_length + self.border
-        levels = np.cumsum([0.0, self.base, self.zone, self.membrane]).tolist()
+        low = np.array([0.0 if self.model == "quarter" else -half, -side if self.model == "full" else 0.0, 0.0])
+        return low, np.array([half, side if self.model != "plane" else 0.0, self._levels[-1]])
+
+    def _markers(self) -> dict[str, FloatArray]:
+        x, top, end = self._middles()[self.segments // 2], self._levels[-1], 0.5 * self.chamber_length
+        low, high = self._corners
+        markers = {"base": np.array([[*high[:2], 0.0]]), "tip": np.array([[x, 0.0, top]])}
+        if self.model == "plane":
+            return markers
+        starts = [-end, 0.0] if low[1] < 0.0 else [0.0]
+        return {**markers, "centreline": np.array([[x, y, top] for y in (*starts, end)])}
+
+    def _sizes(self) -> dict[str, float]:
+        if self.model == "plane":
+            return {"membrane": 0.5 * self.membrane}
+        # Two elements across half a chamber bend with the sheet; it is far too thin for cubes.
+        return {"membrane-face": min(self.default_size, 0.25 * self.chamber_width)}
+
+    def _solids(self) -> dict[str, list[tuple[int, int]]]:
+        occ, (low, high) = cad.occ(), self._corners
+        extent = high - low
 
         def layer(number: int) -> tuple[int, int]:
-            low, high = levels[number : number + 2]
-            return 3, occ.addBox(-half, -side, low, 2 * half, 2 * side, high - low)
+            bottom, top = self._levels[number : number + 2]
+            return 3, occ.addBox(low[0], low[1], bottom, extent[0], extent[1], top - bottom)
 
         base, body, membrane = (layer(number) for number in range(3))
         width, length = self.chamber_width, self.chamber_length
@@ -80,31 +142,37 @@ class Membrane(Actuator):
         for x in self._middles():
             chambers.append((3, occ.addBox(x - width / 2, -length / 2, self.base, width, length, self.zone)))
             inlets.append((3, occ.addCylinder(x, 0, 0, 0, 0, self.base, 0.5 * self.inlet_diameter)))
-        (body,), _ = occ.cut([body], chambers)
-        (base,), _ = occ.cut([base], inlets)
-        x = self._middles()[self.segments // 2]
-        line = np.array([[x, -length / 2, levels[-1]], [x, length / 2, levels[-1]]])
-        middle = np.array([[x, 0.0, levels[-1]]])
-        start, centre, end = (occ.addPoint(*place) for place in (line[0], middle[0], line[1]))
-        lines = [(1, occ.addLine(start, centre)), (1, occ.addLine(centre, end))]
-        _, pieces = occ.fragment([base, body, membrane], lines)
-        occ.synchronize()
-        regions = {
-            name: [tag for _, tag in piece]
-            for name, piece in zip(("base", "body", "membrane"), pieces[:3], strict=True)
-        }
-        return Shape(
-            regions=regions,
-            surfaces=self._surfaces(cad.boundary([tag for tags in regions.values() for tag in tags]), levels[-1]),
-            markers={"base": np.array([[-half, -side, 0.0]]), "tip": middle, "centreline": line},
-            # Two elements across half a chamber bend with the sheet; it is far too thin for cubes.
-            sizes={"membrane-face": min(self.default_size, 0.25 * self.chamber_width)},
-        )
+        body, _ = occ.cut([body], chambers)
+        base, _ = occ.cut([base], inlets)
+        return {"base": base, "body": body, "membrane": [membrane]}
 
-    def _surfaces(self, faces: list[int], top: float) -> dict[str, list[int]]:
-        mount, membrane = (cad.faces_in_plane(faces, "z", z) for z in (0.0, top))
-        outer, *cavities = cad.skins([face for face in faces if face not in mount + membrane])
-        cavities.sort(key=lambda skin: min(cad.bounds(2, face)[0][0] for face in skin))
+    def _faces(self) -> dict[str, list[tuple[int, int]]]:
+        """Draw the section across the chambers, where their inlets are slots as wide as the bores."""
+        low, high = self._corners
+
+        def row(number: int, width: float) -> list[tuple[int, int]]:
+            """Draw the rectangles of a layer that are left between gaps of this width under each chamber."""
+            stops = [x + side * width / 2 for x in self._middles() for side in (-1, 1)] if width else []
+            ends = [low[0], *stops, high[0]]
+            bottom, top = self._levels[number : number + 2]
+            boxes = zip(ends[::2], ends[1::2], strict=True)
+            return [(2, cad.plane_face(polygon([(a, bottom), (b, bottom), (b, top), (a, top)]))) for a, b in boxes]
+
+        return {"base": row(0, self.inlet_diameter), "body": row(1, self.chamber_width), "membrane": row(2, 0.0)}
+
+    def _surfaces(self, tags: list[int], dimension: int) -> dict[str, list[int]]:
+        faces, (low, high) = cad.boundary(tags, dimension), self._corners
+
+        def plane(axis: str, place: float) -> list[int]:
+            return cad.faces_in_plane(faces, axis, place, dimension)
+
+        named = {"mount": plane("z", 0.0), "membrane-face": plane("z", self._levels[-1])}
+        if dimension == 3:
+            named |= {name: plane(axis, 0.0) for name, axis in CUTS[self.model].items()}
+        cut = {face for tags in named.values() for face in tags}
+        sides = [plane(axis, corner["xy".index(axis)]) for axis in "xyz"[: dimension - 1] for corner in (low, high)]
+        named["outer"] = [face for side in sides for face in side if face not in cut]
+        cavities = cad.skins([face for face in faces if face not in cut.union(named["outer"])], dimension)
+        cavities.sort(key=lambda skin: min(cad.bounds(dimension - 1, face)[0][0] for face in skin))
         names = ["cavity"] if self.segments == 1 else [f"cavity-{number + 1}" for number in range(self.segments)]
-        named = {"mount": mount, "membrane-face": membrane, "outer": outer}
         return {**named, **dict(zip(names, cavities, strict=True))}

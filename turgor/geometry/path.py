@@ -71,6 +71,12 @@ def offset_path(start: tuple[float, float], steps: Sequence[Step], distance: flo
     return pieces
 
 
+def polygon(corners: Sequence[tuple[float, float]]) -> list[Piece]:
+    """Return the closed outline through the `corners`, straight from each to the next."""
+    following = [*corners[1:], corners[0]]
+    return [Piece(start, end) for start, end in zip(corners, following, strict=True)]
+
+
 def rounded_polygon(corners: Sequence[tuple[float, float]], inset: float, radius: float) -> list[Piece]:
     """Return the closed outline of a polygon moved inward by `inset` and rounded at every corner.
 

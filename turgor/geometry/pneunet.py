@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.section import CUTS
 
 _STUDY = "Esmalipour and Ajri, PneuNet geometry study, Table 1"
 _ASSUMED = "assumed"
@@ -102,7 +103,7 @@ class PneuNet(Actuator):
         tags = [tag for piece in regions.values() for tag in piece]
         return Shape(
             regions=regions,
-            surfaces=cad.named_skin(cad.boundary(tags), "x", self.length, self.symmetric),
+            surfaces=cad.named_skin(cad.boundary(tags), "x", self.length, CUTS["half" if self.symmetric else "full"]),
             markers={"base": ends[:1], "tip": ends[1:], "centreline": ends},
         )
 

@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.section import CUTS, TURN
 
 _PAPER = "Quasi-static FEA model for a multi-material soft pneumatic actuator in SOFA, section III"
 _ASSUMED = "assumed, the paper's drawing gives no numbers"
@@ -49,6 +50,10 @@ class ReinforcedTube(Actuator):
         """Distance from the first ring's lower edge to the last one's upper edge in mm."""
         return float(self.rings * self.ring_width + (self.rings - 1) * self.ring_spacing)
 
+    @property
+    def _model(self) -> str:
+        return "half" if self.symmetric else "full"
+
     def check(self) -> None:
         """Raise InputError if cavity, rings or band do not fit the tube."""
         limits = {
@@ -70,8 +75,8 @@ class ReinforcedTube(Actuator):
         """Draw the tube, the rings and the band around it, and make their interface common."""
         occ = cad.occ()
         margin = 0.5 * (self.length - self.cavity_length)
-        solid = cad.cylinder(0.0, self.length, 0.5 * self.outer_diameter, self.symmetric)
-        air = cad.cylinder(margin, self.length - margin, 0.5 * self.inner_diameter, self.symmetric)
+        solid = cad.cylinder(0.0, self.length, 0.5 * self.outer_diameter, TURN[self._model])
+        air = cad.cylinder(margin, self.length - margin, 0.5 * self.inner_diameter, TURN[self._model])
         (tube,), _ = occ.cut([solid], [air])
         ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
         low = 0.5 * (self.length - self.reinforced_length)
@@ -86,7 +91,7 @@ class ReinforcedTube(Actuator):
         stiff = sorted({tag for piece in pieces[1 : 1 + len(reinforcement)] for _, tag in piece})
         return Shape(
             regions={"body": body, "reinforcement": stiff},
-            surfaces=cad.named_skin(cad.boundary(body + stiff), "z", self.length, self.symmetric),
+            surfaces=cad.named_skin(cad.boundary(body + stiff), "z", self.length, CUTS[self._model]),
             markers={"base": ends[:1], "tip": ends[1:], "centreline": line},
         )
 
@@ -97,7 +102,7 @@ class ReinforcedTube(Actuator):
         start = 0.5 * (self.length - self.reinforced_length)
         end = self.length - start
         shell, _ = occ.cut(
-            [cad.cylinder(start, end, outer, self.symmetric)], [cad.cylinder(start, end, inner, self.symmetric)]
+            [cad.cylinder(start, end, outer, TURN[self._model])], [cad.cylinder(start, end, inner, TURN[self._model])]
         )
         half_angle = 0.5 * self.band_width / inner
         pitch = self.ring_width + self.ring_spacing

@@ -1,8 +1,11 @@
-"""What a plane drawing stands for, told by the shape itself so that nobody has to say it twice."""
+"""How much of a body is drawn: the whole, a part between planes of symmetry, or a plane that stands for the body."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 
@@ -21,3 +24,17 @@ class PlaneSection:
 
     kind: Literal["plane-strain", "plane-stress", "axisymmetric"]
     thickness: float | None = None
+
+
+TURN: Mapping[str, float] = MappingProxyType({"full": 2.0 * math.pi, "half": math.pi, "quarter": 0.5 * math.pi})
+"""Model of a body around z → angle in rad, from the x axis on, that is drawn of it."""
+
+CUTS: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "full": {},
+        "half": {"symmetry": "y"},
+        "quarter": {"symmetry-x": "x", "symmetry-y": "y"},
+        "axisymmetric": {"axis": "x"},
+    }
+)
+"""Model of a body → the names of the cuts through it and the axes across which they lie, all through the origin."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -10,26 +10,41 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.path import polygon
+from turgor.geometry.section import CUTS, TURN, PlaneSection
+
+_CASE_T = "case T of the solver's measurements"
 
 
 class CappedTube(Actuator):
     """A straight round tube, closed by a solid cap at either end, along the z axis from the mount at z = 0.
 
-    Surfaces ``mount`` (end face at z = 0), ``tip-face``, ``outer``, ``cavity``; region ``body``; markers ``base`` and
-    ``tip`` (centres of the end faces) and ``centreline`` (along the outside at y = 0, x > 0, from mount to tip).
+    Surfaces ``mount`` (end face at z = 0), ``tip-face``, ``outer``, ``cavity``; of the half model ``symmetry`` (the cut
+    y = 0), of the quarter ``symmetry-x`` and ``symmetry-y``, of the axisymmetric one ``axis``; region ``body``; markers
+    ``base`` and ``tip`` (centres of the end faces) and ``centreline`` (along the outside at y = 0, x > 0, from mount to
+    tip).
     """
 
     template: ClassVar[str] = "tube"
 
-    inner_radius: PositiveLength = parameter("6.35 mm", "radius of the cavity", "case T of the solver's measurements")
-    wall: PositiveLength = parameter("3.5 mm", "thickness of the tube's wall", "case T of the solver's measurements")
-    length: PositiveLength = parameter("120 mm", "length, caps included", "case T of the solver's measurements")
-    cap: PositiveLength = parameter("17 mm", "thickness of either end cap", "case T of the solver's measurements")
+    inner_radius: PositiveLength = parameter("6.35 mm", "radius of the cavity", _CASE_T)
+    wall: PositiveLength = parameter("3.5 mm", "thickness of the tube's wall", _CASE_T)
+    length: PositiveLength = parameter("120 mm", "length, caps included", _CASE_T)
+    cap: PositiveLength = parameter("17 mm", "thickness of either end cap", _CASE_T)
+
+    model: Literal["full", "half", "quarter", "axisymmetric"] = parameter(
+        "full", "the whole, the half y ≥ 0, the quarter x, y ≥ 0, or the section of radius and height", _CASE_T
+    )
+
+    @property
+    def section(self) -> PlaneSection | None:
+        """One half of the section through the axis, turned about it; None for a model in space."""
+        return PlaneSection("axisymmetric") if self.model == "axisymmetric" else None
 
     @property
     def default_size(self) -> float:
-        """One element through the thinner of wall and cap."""
-        return float(min(self.wall, self.cap))
+        """One element through the thinner of wall and cap, three in the section, where they cost little."""
+        return float(min(self.wall, self.cap) / (3.0 if self.model == "axisymmetric" else 1.0))
 
     def check(self) -> None:
         """Raise InputError if the caps leave no cavity between them."""
@@ -42,18 +57,31 @@ class CappedTube(Actuator):
             )
 
     def draw(self) -> Shape:
-        """Draw the outer cylinder less the inner one."""
-        occ = cad.occ()
-        outer = self.inner_radius + self.wall
-        solid = occ.addCylinder(0, 0, 0, 0, 0, self.length, outer)
-        air = occ.addCylinder(0, 0, self.cap, 0, 0, self.length - 2 * self.cap, self.inner_radius)
-        (hollow,), _ = occ.cut([(3, solid)], [(3, air)])
+        """Draw the section, or the outer cylinder less the inner one."""
+        flat = self.model == "axisymmetric"
+        outside = self.inner_radius + self.wall
         ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
-        body = cad.with_points(hollow[1], ends)
+        body = cad.with_points(self._face() if flat else self._solid(), ends, 2 if flat else 3)
+        boundary = cad.boundary([body], 2 if flat else 3)
         # OpenCASCADE's seam of the cylinder is the edge that carries the nodes of the centreline.
-        seam = ends + np.array([outer, 0.0, 0.0])
+        lines = {"base": ends[:1], "tip": ends[1:], "centreline": ends + np.array([outside, 0.0, 0.0])}
         return Shape(
             regions={"body": [body]},
-            surfaces=cad.named_skin(cad.boundary([body]), "z", self.length),
-            markers={"base": ends[:1], "tip": ends[1:], "centreline": seam},
+            surfaces=cad.named_skin(boundary, "z", self.length, CUTS[self.model], 2 if flat else 3),
+            markers={name: line[:, [0, 2]] if flat else line for name, line in lines.items()},
+            dimension=2 if flat else 3,
         )
+
+    def _solid(self) -> int:
+        outside, turn = self.inner_radius + self.wall, TURN[self.model]
+        solid = cad.cylinder(0.0, self.length, outside, turn)
+        air = cad.cylinder(self.cap, self.length - self.cap, self.inner_radius, turn)
+        (hollow,), _ = cad.occ().cut([solid], [air])
+        return int(hollow[1])
+
+    def _face(self) -> int:
+        inside, outside = self.inner_radius, self.inner_radius + self.wall
+        low, high, end = self.cap, self.length - self.cap, self.length
+        corners = [(0.0, 0.0), (outside, 0.0), (outside, end), (0.0, end)]
+        corners += [(0.0, high), (inside, high), (inside, low), (0.0, low)]
+        return cad.plane_face(polygon(corners))
