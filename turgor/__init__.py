@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from turgor.study.api import Model
     from turgor.study.case import Case, load_case
     from turgor.study.environment import environment
+    from turgor.study.export.write import export_case
     from turgor.study.fitting import fit_document, write_fit_report, write_material
     from turgor.study.path import Path
     from turgor.study.run import Run, mesh_case, run
@@ -64,6 +65,7 @@ __all__ = [
     "TurgorError",
     "assess",
     "environment",
+    "export_case",
     "find_material",
     "fit",
     "fit_document",
@@ -95,6 +97,7 @@ _HOMES = {
     "turgor.study.api": ("Model",),
     "turgor.study.case": ("Case", "load_case"),
     "turgor.study.environment": ("environment",),
+    "turgor.study.export.write": ("export_case",),
     "turgor.study.fitting": ("fit_document", "write_fit_report", "write_material"),
     "turgor.study.path": ("Path",),
     "turgor.study.run": ("Run", "mesh_case", "run"),

@@ -36,7 +36,7 @@ def test_version() -> None:
 def test_help_lists_the_commands() -> None:
     result = turgor("--help")
     assert result.exit_code == 0
-    for command in ("run", "fit", "materials", "templates", "mesh", "schema", "doctor"):
+    for command in ("run", "fit", "materials", "templates", "mesh", "export", "schema", "doctor"):
         assert f"\n  {command} " in result.stdout
         assert turgor(command, "--help").exit_code == 0
 
@@ -223,3 +223,21 @@ def test_doctor_tells_what_it_stands_on(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr("turgor.study.environment.require", absent)
     assert "apt-get install libgl1" in turgor("doctor").stderr
+
+
+@pytest.mark.parametrize("suffix", [".inp", ".feb"])
+def test_export_writes_a_model(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"tube{suffix}"
+    facts = printed("export", SMALL, "--out", path, "--json")
+    assert facts["file"] == str(path)
+    assert path.read_text(encoding="utf-8").count({".inp": "*STEP", ".feb": "<pt>"}[suffix]) >= 4
+
+
+def test_export_refuses_what_the_program_lacks(tmp_path: Path) -> None:
+    result = turgor("export", SMALL, "--out", tmp_path / "tube.bdf")
+    assert result.exit_code == 2
+    assert ".inp (CalculiX, Abaqus) or .feb (FEBio)" in result.stderr
+    result = turgor("export", SMALL, "--out", tmp_path / "tube.inp", "--set", "contact=true")
+    assert result.exit_code == 2
+    assert "contact" in result.stderr
+    assert not (tmp_path / "tube.inp").exists()

@@ -204,6 +204,30 @@ def mesh(
 
 
 @app.command()
+def export(
+    case_file: CaseFile,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Model: .inp (CalculiX, Abaqus; the case's name if left out) or .feb (FEBio)."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a case as a model that another program runs: mesh, materials, supports, loads and states."""
+    with naming(case_file):
+        case = tg.load_case(case_file, changes or ())
+        path = out or Path(f"{case.name}.inp")
+        mesh = tg.export_case(case, path)
+    facts = {"file": str(path), "elements": mesh.n_cells, "nodes": mesh.n_points}
+    if as_json:
+        print_json(facts)
+    else:
+        print_table(tables.pairs(case.name, facts))
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON Schema of case files, by which an editor completes their keys."""
     print_json(tg.Case.model_json_schema())

@@ -1,7 +1,8 @@
 """Meshes for other solvers: node, element, set and surface blocks of Abaqus and CalculiX (.inp) and FEBio (.feb).
 
-Both count from one, and both order the nodes of a ten-node tetrahedron and a six-node triangle as we do. The files hold
-the mesh only; a deck takes them in by ``*INCLUDE, INPUT=mesh.inp`` or ``<Mesh from="mesh.feb"/>``.
+Both count from one, and both order the nodes of a ten-node tetrahedron and a six-node triangle as we do. The files
+written here hold the mesh only (a deck takes them in by ``*INCLUDE, INPUT=mesh.inp`` or ``<Mesh from="mesh.feb"/>``);
+:mod:`turgor.study.export` makes models of them.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def write_deck(mesh: Mesh, path: str | Path) -> None:
         written.
     """
     path = Path(path)
-    writers = {".inp": _inp, ".feb": _feb}
+    writers = {".inp": inp_lines, ".feb": _feb}
     if path.suffix not in writers:
         expected = "a name that ends in .inp or .feb"
         raise InputError("this kind of deck is not known", file=path, value=path.suffix, expected=expected)
@@ -51,9 +52,11 @@ def write_deck(mesh: Mesh, path: str | Path) -> None:
         raise InputError(f"the mesh cannot be written: {error.strerror}", file=path) from error
 
 
-def _inp(mesh: Mesh) -> Iterator[str]:
+def inp_lines(mesh: Mesh) -> Iterator[str]:
+    """Yield the blocks of a .inp file; raise InputError if two names become one label."""
     yield "*NODE, NSET=ALL_NODES"
-    yield from (f"{number}, {x!r}, {y!r}, {z!r}" for number, (x, y, z) in enumerate(mesh.points.tolist(), start=1))
+    for number, place in enumerate(mesh.points.tolist(), start=1):
+        yield ", ".join([str(number), *map(inp_number, place)])
     for name, cells in _labelled(mesh.regions):
         yield f"*ELEMENT, TYPE=C3D10, ELSET={name}"
         for cell in cells.tolist():
@@ -62,7 +65,7 @@ def _inp(mesh: Mesh) -> Iterator[str]:
         yield f"*NSET, NSET={name}"
         yield from _rows(nodes + 1, 12)
     for name, triangles in _labelled(mesh.surfaces):
-        hosts, sides = _element_faces(mesh, triangles)
+        hosts, sides = element_faces(mesh, triangles)
         used = [side for side in range(4) if (sides == side).any()]
         for side in used:
             yield f"*ELSET, ELSET={name}_S{side + 1}"
@@ -71,7 +74,7 @@ def _inp(mesh: Mesh) -> Iterator[str]:
         yield from (f"{name}_S{side + 1}, S{side + 1}" for side in used)
 
 
-def _element_faces(mesh: Mesh, triangles: Ints) -> tuple[Ints, Ints]:
+def element_faces(mesh: Mesh, triangles: Ints) -> tuple[Ints, Ints]:
     """Return the host cell and the number (0 to 3) of its face in Abaqus's count, of each triangle."""
     hosts = host_cells(mesh.cells, triangles)
     sides = np.sort(mesh.cells[hosts][:, _INP_FACES], axis=2)
@@ -82,6 +85,12 @@ def _element_faces(mesh: Mesh, triangles: Ints) -> tuple[Ints, Ints]:
 def _feb(mesh: Mesh) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield '<febio_spec version="4.0">'
+    yield from feb_mesh_lines(mesh)
+    yield "</febio_spec>"
+
+
+def feb_mesh_lines(mesh: Mesh) -> Iterator[str]:
+    """Yield the ``Mesh`` section of a .feb file."""
     yield "<Mesh>"
     yield '<Nodes name="all">'
     for number, (x, y, z) in enumerate(mesh.points.tolist(), start=1):
@@ -100,7 +109,6 @@ def _feb(mesh: Mesh) -> Iterator[str]:
             yield f'<tri6 id="{number}">{_joined(triangle + 1)}</tri6>'
         yield "</Surface>"
     yield "</Mesh>"
-    yield "</febio_spec>"
 
 
 def _node_sets(mesh: Mesh) -> dict[str, Ints]:
@@ -111,8 +119,18 @@ def _node_sets(mesh: Mesh) -> dict[str, Ints]:
     return sets
 
 
+def inp_number(value: float) -> str:
+    """Return a number for a .inp file: CalculiX reads no more than twenty characters, and drops the others."""
+    return f"{value:.13g}"
+
+
+def label(name: str) -> str:
+    """Return a name as the label that it becomes in a .inp file."""
+    return name.upper().replace("-", "_").replace(" ", "_")
+
+
 def _labelled(things: Mapping[str, Ints]) -> list[tuple[str, Ints]]:
-    labels = [name.upper().replace("-", "_").replace(" ", "_") for name in things]
+    labels = [label(name) for name in things]
     twice = sorted({label for label in labels if labels.count(label) > 1})
     if twice:
         raise InputError("two names become the same label", value=twice[0])

@@ -1,0 +1,134 @@
+"""What CalculiX makes of an exported case, against Turgor and against closed forms."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from turgor.common.errors import InputError
+from turgor.materials.compressible import free_response
+from turgor.materials.registry import create
+from turgor.mesh.structured import box
+from turgor.solver.path import solve_path
+from turgor.study.build import system_of
+from turgor.study.export.calculix import inp_model
+from turgor.study.export.problem import problem_of
+from turgor.study.materials import build_materials
+
+needs_calculix = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+
+STRETCHING = {
+    "neo-hookean": {"C10": 0.05},
+    "mooney-rivlin-2": {"C10": 0.04, "C01": 0.01},
+    "mooney-rivlin-5": {"C10": 0.04, "C01": 0.01, "C20": 0.002, "C11": 0.003, "C02": 0.001},
+    "mooney-rivlin-9": dict.fromkeys(("C20", "C11", "C02", "C30", "C21", "C12", "C03"), 1e-3)
+    | {"C10": 0.04, "C01": 0.01},
+    "yeoh-2": {"C10": 0.05, "C20": 0.01},
+    "yeoh-3": {"C10": 0.05, "C20": 0.01, "C30": 0.003},
+    "ogden-1": {"mu1": 0.1, "alpha1": 3.0},
+    "ogden-3": {"mu1": 0.05, "alpha1": 1.3, "mu2": 0.03, "alpha2": 4.0, "mu3": 0.02, "alpha3": -2.0},
+    "arruda-boyce": {"mu": 0.1, "lambda_m": 2.0},
+}
+
+
+def solved(lines, folder):
+    """Return the displacement that CalculiX prints last for each node."""
+    (folder / "model.inp").write_text("\n".join(lines) + "\n")
+    run = subprocess.run(["ccx", "model"], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    assert "Job finished" in run.stdout, run.stdout[-1000:]
+    rows = [line.split() for line in (folder / "model.dat").read_text().splitlines()]
+    return {int(row[0]) - 1: np.array([float(x) for x in row[1:]]) for row in rows if len(row) == 4}
+
+
+def lines_of(case, mesh, **materials):
+    return inp_model(problem_of(case, mesh, materials or build_materials(case.materials)[0], "CalculiX"))
+
+
+@needs_calculix
+def test_a_compressible_ball_swells_as_in_turgor(ball, octant, tmp_path):
+    case = ball()
+    (moved,) = solved(lines_of(case, octant), tmp_path).values()
+    states = []
+    solve_path(system_of(case, octant, build_materials(case.materials)[0]), [1.0], on_equilibrium=states.append)
+    expected = states[-1].state.u[octant.marker("tip")[0]]
+    assert expected[2] > 0.2
+    np.testing.assert_allclose(moved, expected, atol=0.01 * expected[2])
+
+
+@needs_calculix
+@pytest.mark.parametrize("model", STRETCHING)
+def test_every_model_stretches_a_bar_as_its_formula_says(model, ball, tmp_path):
+    bar = box((1.0, 1.0, 1.0), (1, 1, 1))
+    corner = int(bar.points.sum(axis=1).argmax())
+    bar = type(bar)(bar.points, bar.cells, surfaces=bar.surfaces, markers={"tip": [corner]})
+    case = ball(
+        supports=[{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")]
+        + [{"type": "displacement", "surface": "x1", "x": "0.5 mm"}],
+        loads=[{"type": "traction", "surface": "x1", "value": "1e-9 MPa", "direction": [1, 0, 0]}],
+        solver={"steps": 1},
+    )
+    material = create(model, STRETCHING[model], poisson=0.45)
+    lateral, _ = free_response(material, "uniaxial", np.array([1.5]))
+    moved = solved(lines_of(case, bar, body=material), tmp_path)[corner]
+    # Arruda and Boyce's law of the volume change is another one there, equal to second order only.
+    tolerance = 2e-3 if model == "arruda-boyce" else 2e-6
+    np.testing.assert_allclose(moved, [0.5, lateral[0] - 1, lateral[0] - 1], atol=tolerance)
+
+
+@needs_calculix
+def test_weight_and_a_force_pull_a_bar(ball, tmp_path):
+    bar = box((1.0, 1.0, 10.0), (1, 1, 4))
+    end = int(bar.points.sum(axis=1).argmax())
+    bar = type(bar)(bar.points, bar.cells, surfaces=bar.surfaces, markers={"tip": [end]})
+    case = ball(
+        materials={
+            "body": {
+                "model": "neo-hookean", "constants": {"C10": "0.05 MPa"}, "poisson": 0.2, "density": "1e-8 t/mm^3"
+            }
+        },
+        supports=[{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
+        loads=[
+            {"type": "gravity", "direction": [0, 0, 1], "acceleration": "1000 mm/s^2"},
+            {"type": "force", "surface": "z1", "value": "1e-4 N", "direction": [0, 0, 1]},
+        ],
+        solver={"steps": 1},
+    )  # fmt: skip
+    moved = solved(lines_of(case, bar), tmp_path)[end]
+    # Small strains: u = (F L + ρ g L² / 2) / E with E = 2 μ (1 + ν) = 0.24 MPa on 1 mm².
+    assert moved[2] == pytest.approx((1e-4 * 10 + 1e-8 * 1000 * 50) / 0.24, rel=0.01)
+
+
+def test_each_state_is_the_end_of_a_step(ball, octant):
+    text = "\n".join(lines_of(ball(), octant))
+    assert text.count("*STEP, NLGEOM") == 2
+    assert set(re.findall(r"^CAVITY_S\d, P\d, (\S+)$", text, re.MULTILINE)) == {"0.0125", "0.025"}
+    assert "X0, 1, 1\nY0, 2, 2\nZ0, 3, 3" in text
+    # CalculiX drops what follows the twentieth character of a number.
+    assert max(len(word) for line in text.splitlines() if line[0].isdigit() for word in line.split(", ")) <= 20
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"contact": True}, "contact: this is not written for CalculiX"),
+        ({"supports": [{"type": "elastic", "surface": "x0", "stiffness": "1 N/mm^3"}]}, "a bed of springs"),
+        ({"supports": [{"type": "sliding", "surface": "outer"}]}, r"supports\.0\.surface: a sliding surface"),
+    ],
+)  # fmt: skip
+def test_what_calculix_lacks_is_refused(changes, message, ball, octant):
+    with pytest.raises(InputError, match=message):
+        list(lines_of(ball(**changes), octant))
+
+
+@pytest.mark.parametrize("model", ["gent", "hencky", "van-der-waals", "extended-tube"])
+def test_a_model_that_calculix_lacks_is_refused_by_its_name(model, ball, octant):
+    constants = {
+        "gent": {"mu": 0.1, "Jm": 50.0},
+        "hencky": {"mu": 0.1},
+        "van-der-waals": {"mu": 0.1, "lambda_m": 8.0, "a": 0.2, "beta": 0.0},
+        "extended-tube": {"Gc": 0.1, "delta": 0.1, "Ge": 0.1, "beta": 0.5},
+    }
+    with pytest.raises(InputError, match=f"CalculiX has no such material.*{model}"):
+        list(lines_of(ball(), octant, body=create(model, constants[model])))

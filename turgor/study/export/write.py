@@ -1,0 +1,56 @@
+"""Write a case as a complete model of another program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from turgor.common.errors import InputError
+from turgor.mesh import Mesh
+from turgor.study.case import Case
+from turgor.study.export import calculix, febio
+from turgor.study.export.problem import Problem, problem_of
+from turgor.study.materials import build_materials
+from turgor.study.run import mesh_case
+
+_Writer = Callable[[Problem], Iterator[str]]
+_PROGRAMS: dict[str, tuple[str, _Writer]] = {
+    ".inp": (calculix.PROGRAM, calculix.inp_model),
+    ".feb": (febio.PROGRAM, febio.feb_model),
+}
+
+
+def export_case(case: Case, path: str | Path) -> Mesh:
+    """Write a case as a model that another program runs: mesh, materials, supports, loads and the states asked for.
+
+    Parameters
+    ----------
+    case
+        What to write.
+    path
+        ``.inp`` for CalculiX and Abaqus, ``.feb`` for FEBio 4.
+
+    Returns
+    -------
+    Mesh
+        The mesh that was written.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another one, the program lacks something that the case uses, the case cannot be run as it
+        stands, or the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in _PROGRAMS:
+        expected = "a name that ends in .inp (CalculiX, Abaqus) or .feb (FEBio)"
+        raise InputError("models of this kind are not written", file=path, value=path.suffix, expected=expected)
+    program, writer = _PROGRAMS[path.suffix]
+    materials, _ = build_materials(case.materials)
+    mesh = mesh_case(case)
+    lines = list(writer(problem_of(case, mesh, materials, program)))
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"the model cannot be written: {error.strerror}", file=path) from error
+    return mesh
