@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.programme import CONSTANT, PROPORTIONAL, Programme
 from turgor.fem.section import Section, surface_areas
 from turgor.fem.state import State
 from turgor.fem.term import NO_NODES, Unlagged
@@ -20,10 +21,11 @@ Vector = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Pressure:
-    """Air pressure in a closed cavity, MPa above the surroundings; it grows with the load fraction."""
+    """Air pressure in a closed cavity, MPa above the surroundings, along its programme."""
 
     cavity: str
     value: float
+    programme: Programme = PROPORTIONAL
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,11 @@ class Gravity:
 
     acceleration: Vector
 
+    @property
+    def programme(self) -> Programme:
+        """How it follows the load fraction: not at all."""
+        return CONSTANT
+
 
 @dataclass(frozen=True)
 class Traction:
@@ -39,6 +46,7 @@ class Traction:
 
     surface: str
     vector: Vector
+    programme: Programme = PROPORTIONAL
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,7 @@ class Force:
 
     surface: str
     vector: Vector
+    programme: Programme = PROPORTIONAL
 
 
 Load = Pressure | Gravity | Traction | Force

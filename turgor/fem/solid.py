@@ -89,6 +89,13 @@ class Solid:
         at = int(np.argmin(self._J.min(axis=1)))
         return float(self._J[at].min()), int(self.index[at])
 
+    def isochoric_stretches(self, u: Floats) -> Floats:
+        """Return the principal stretches of the isochoric deformation at the quadrature points, ``(m, q, 3)``."""
+        self._deform(u)
+        stretches, directions = np.empty((self._J.size, 3)), np.empty((self._J.size, 3, 3))
+        constitutive.isochoric_stretches(self._F.reshape(-1, 3, 3), self._J.ravel(), stretches, directions)
+        return stretches.reshape(*self._J.shape, 3)
+
     def rounding(self, u: Floats) -> float:
         """Return the size of the forces, N, that rounding alone causes at displacement `u`.
 

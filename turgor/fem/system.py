@@ -21,6 +21,7 @@ from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
 from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import SparsePattern, packed_size
+from turgor.fem.programme import PROPORTIONAL, Programme
 from turgor.fem.section import PlaneStress, Section, check_section, in_section
 from turgor.fem.sheet import Sheet
 from turgor.fem.solid import Solid
@@ -82,6 +83,7 @@ class System:
         moving = [c for c in contact if isinstance(c, RigidContact) and c.motion is not None]
         self.loads = (*loads, *moving)
         self.load_names = _load_names(self.loads)
+        self._programmes = [_programme(load) for load in self.loads]
         held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
         springs = [s for s in supports if isinstance(s, ElasticSupport)]
         self.constraints = compile_constraints(mesh, held, section)
@@ -114,26 +116,38 @@ class System:
         return self.consistent(np.zeros_like(self.mesh.points), np.zeros(len(self.loads)))
 
     def loads_at(self, fraction: float) -> Floats:
-        """Return the loads ``(n_loads,)`` at a load fraction: weight in full, the others in proportion."""
-        values = []
-        for load in self.loads:
-            full = load.value if isinstance(load, Pressure) else 1.0
-            values.append(full if isinstance(load, Gravity) else fraction * full)
-        return np.array(values)
+        """Return the loads ``(n_loads,)`` at a load fraction, each along its programme."""
+        return np.array([full * programme.at(fraction) for full, programme in self._programmes])
+
+    def growth(self, fraction: float) -> Floats:
+        """Return the derivatives of the loads ``(n_loads,)`` by the load fraction."""
+        return np.array([full * programme.slope(fraction) for full, programme in self._programmes])
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """The load fractions within (0, 1) at which a load's programme changes its slope, ascending."""
+        return tuple(sorted({f for _, programme in self._programmes for f in programme.kinks if 0.0 < f < 1.0}))
 
     @property
     def loaded_at_start(self) -> bool:
         """Whether something acts already at load fraction zero (weight)."""
         return bool(np.any(self.loads_at(0.0)))
 
-    def conjugate(self, state: State) -> float:
-        """Return −∂Π/∂f, f the load fraction: what the loads that grow with it work on, N mm (pressure × volume)."""
-        growth = self.loads_at(1.0) - self.loads_at(0.0)
+    def conjugate(self, state: State, growth: Floats | None = None) -> float:
+        """Return −∂Π/∂f, f the load fraction: what the loads that grow with it work on, N mm (pressure × volume).
+
+        `growth` are the derivatives of the loads by f ``(n_loads,)``; left out, those at the start. Other weights
+        give another measure of the state: a single one at a cavity its volume.
+        """
+        growth = self.growth(0.0) if growth is None else growth
         return sum(float(growth[term.channel]) * term.conjugate(state) for term in self._loaded)
 
-    def load_direction(self, state: State) -> Floats:
-        """Return ∂²Π/∂u∂f ``(n_points, d)``, N: the derivative of the forces by the load fraction."""
-        growth = self.loads_at(1.0) - self.loads_at(0.0)
+    def load_direction(self, state: State, growth: Floats | None = None) -> Floats:
+        """Return ∂²Π/∂u∂f ``(n_points, d)``, N: the derivative of the forces by the load fraction.
+
+        It is also −∂Q/∂u of the conjugate Q of the same `growth`.
+        """
+        growth = self.growth(0.0) if growth is None else growth
         total = np.zeros_like(state.u)
         for term in self._loaded:
             part = np.zeros_like(state.u)
@@ -299,6 +313,13 @@ def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section 
         kind(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material, section)
         for name, material in materials.items()
     ]
+
+
+def _programme(load: Load | RigidContact) -> tuple[float, Programme]:
+    """Return a load's full value and how it follows the load fraction."""
+    if isinstance(load, RigidContact):
+        return 1.0, PROPORTIONAL
+    return load.value if isinstance(load, Pressure) else 1.0, load.programme
 
 
 def _load_names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:

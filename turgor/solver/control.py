@@ -2,7 +2,8 @@
 
 Under each of these the load fraction f is an unknown. The equation that takes its place relates f to its conjugate Q
 (:meth:`turgor.fem.system.System.conjugate`; for one cavity its volume times its full pressure), so that every control
-is a curve in the plane of these two, and the path of equilibria is cut with it.
+is a curve in the plane of these two, and the path of equilibria is cut with it. With weights of its own, Q is another
+measure of the state: a single one at a cavity is its volume, whatever the other loads do.
 """
 
 from __future__ import annotations
@@ -10,9 +11,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+ATMOSPHERE = 0.101325
+"""Pressure of the surroundings, MPa."""
+
 
 class Control(Protocol):
-    """A curve g(Q, f) = 0."""
+    """A curve g(Q, f) = 0; `weights` ``(n_loads,)`` make Q of the loads' conjugates, ``None``: the loads' growth."""
+
+    @property
+    def weights(self) -> Floats | None:
+        """The weights of Q."""
+        ...
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return g and its derivatives by Q and by f."""
@@ -23,11 +38,12 @@ class Control(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FixedConjugate:
     """Q has a given value: volume control."""
 
     target: float
+    weights: Floats | None = None
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return Q − target."""
@@ -40,7 +56,7 @@ class FixedConjugate:
         return abs(self.target)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AirAmount:
     """A closed amount of air at constant temperature: (p + p₀) V = n (Boyle), for one cavity.
 
@@ -52,11 +68,14 @@ class AirAmount:
         Pressure of the cavity at load fraction one, MPa above the surroundings.
     surroundings
         p₀, MPa.
+    weights
+        The full pressure at the cavity's load, zero at the others; ``None`` where no other load grows.
     """
 
     amount: float
     full_pressure: float
-    surroundings: float = 0.101325
+    surroundings: float = ATMOSPHERE
+    weights: Floats | None = None
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return (p + p₀) V − n."""
@@ -70,7 +89,7 @@ class AirAmount:
         return abs(self.amount)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ArcLength:
     """A given distance from a point of the path, in the plane of Q and f (Riks 1979; Crisfield 1981).
 
@@ -84,6 +103,8 @@ class ArcLength:
         What counts as one along each axis.
     length
         The distance.
+    weights
+        The weights of Q.
     """
 
     conjugate: float
@@ -91,6 +112,7 @@ class ArcLength:
     conjugate_scale: float
     fraction_scale: float
     length: float
+    weights: Floats | None = None
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return the squared distance less the squared length."""
@@ -102,3 +124,53 @@ class ArcLength:
         """Return the squared length."""
         del conjugate
         return self.length**2
+
+
+class Quantity(Protocol):
+    """What grows along a walk and is prescribed instead of the load; :class:`Control` fixes one value of it."""
+
+    @property
+    def weights(self) -> Floats | None:
+        """The weights of Q."""
+        ...
+
+    def value(self, conjugate: float, fraction: float) -> float:
+        """Return the quantity."""
+        ...
+
+    def fixed(self, value: float) -> Control:
+        """Return the control under which it has a value."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """Q itself; with weights of one at some cavities and zero elsewhere, what these enclose, mm³."""
+
+    weights: Floats | None = None
+
+    def value(self, conjugate: float, fraction: float) -> float:
+        """Return Q."""
+        del fraction
+        return conjugate
+
+    def fixed(self, value: float) -> FixedConjugate:
+        """Return the control of volume."""
+        return FixedConjugate(value, self.weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Air:
+    """The amount of air in a cavity, (p + p₀) V; see :class:`AirAmount`, which fixes it."""
+
+    full_pressure: float
+    surroundings: float
+    weights: Floats
+
+    def value(self, conjugate: float, fraction: float) -> float:
+        """Return (p + p₀) V, N mm."""
+        return (fraction * self.full_pressure + self.surroundings) * conjugate / self.full_pressure
+
+    def fixed(self, value: float) -> AirAmount:
+        """Return the control of the amount of air."""
+        return AirAmount(value, self.full_pressure, self.surroundings, self.weights)

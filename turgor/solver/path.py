@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from turgor.common.errors import InputError, SolverError
+from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.fem.contact.term import LARGEST_OVERLAP
-from turgor.fem.loads import Pressure
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.control import Volume
+from turgor.solver.events import Event
+from turgor.solver.limits import after_snap
 from turgor.solver.linear import LinearSolver, make_linear_solver
-from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
-from turgor.solver.volume import LimitPoint, VolumeWalk
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
+from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
+from turgor.solver.tally import Tally
+from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, softest_mode
+
+__all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
 log = logger("solver")
 
@@ -27,6 +34,11 @@ EASY = 7
 
 FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
+
+LARGE_CHANGE = 1.0
+"""Part of the conjugate by which a step may change it without being asked whether it has jumped."""
+
+MONOTONE = 3.0
 
 STIFFER = 6
 """How often contact is made stiffer before one equilibrium is given up."""
@@ -45,26 +57,15 @@ class PathOptions:
         Tolerance and iteration limit of each equilibrium.
     largest_step, smallest_step
         Bounds of a step in load fraction. The walk ends where not even the smallest step finds an equilibrium.
+    post_snap
+        Whether to go on behind a limit from where the actuator snaps to: the state under the same loads. Otherwise the
+        walk ends at a limit.
     """
 
     newton: NewtonOptions = field(default_factory=NewtonOptions)
     largest_step: float = 1.0
     smallest_step: float = 1e-3
-
-
-class StoppedShortError(SolverError):
-    """No equilibrium was found beyond the last one delivered."""
-
-
-class LimitPressureError(StoppedShortError):
-    """The load has a maximum on the way: beyond it there is no equilibrium, whatever the solver.
-
-    ``limit`` is the state of the maximum, found by volume control, with the eigenmode in which the actuator gives way.
-    """
-
-    def __init__(self, reason: str, *, advice: str, facts: dict[str, object], limit: LimitPoint) -> None:
-        super().__init__(reason, advice=advice, facts=facts)
-        self.limit = limit
+    post_snap: bool = False
 
 
 def solve_path(
@@ -84,7 +85,8 @@ def solve_path(
         The actuator.
     fractions
         Ascending load fractions in (0, 1] at which an equilibrium is wanted; each is hit exactly, whatever steps
-        lie between. Weight acts in full from the start, and its equilibrium at fraction 0 is delivered first.
+        lie between. Weight acts in full from the start, and its equilibrium at fraction 0 is delivered first. Where a
+        load's programme has a kink, the walk stops too, but delivers nothing.
     options
         Tolerances and step bounds.
     start
@@ -97,7 +99,9 @@ def solve_path(
     Returns
     -------
     list of Equilibrium
-        The requested equilibria (without `start`).
+        The requested equilibria (without `start`), and between them the states of special kind that were met
+        (:class:`turgor.solver.events.Event`): a bifurcation, and with `PathOptions.post_snap` limits and the states
+        behind them.
 
     Raises
     ------
@@ -109,7 +113,6 @@ def solve_path(
     wanted = [float(f) for f in fractions]
     if not wanted or not all(0.0 < f <= 1.0 for f in wanted) or any(b <= a for a, b in itertools.pairwise(wanted)):
         raise InputError("the load fractions must ascend within 0 < f ≤ 1", key="fractions", value=wanted)
-    walk = _Walk(system, options or PathOptions(), start, on_progress)
     reached: list[Equilibrium] = []
 
     def deliver(equilibrium: Equilibrium) -> None:
@@ -117,17 +120,17 @@ def solve_path(
         if on_equilibrium is not None:
             on_equilibrium(equilibrium)
 
+    walk = _Walk(system, options or PathOptions(), start, deliver, on_progress)
     try:
         if start is None and system.loaded_at_start:
             walk.settle()
-            deliver(walk.arrival())
+            walk.deliver()
         for fraction in wanted:
-            if fraction > walk.here.fraction:
-                walk.to(fraction)
-                deliver(walk.arrival())
+            for stop in (*(kink for kink in system.kinks if kink < fraction), fraction):
+                walk.to(stop)
+            walk.deliver()
     except StoppedShortError:
-        if walk.has_moved:
-            deliver(walk.arrival())
+        walk.deliver()
         raise
     return reached
 
@@ -140,38 +143,31 @@ class _Walk:
         system: System,
         options: PathOptions,
         start: Equilibrium | None,
+        on_equilibrium: Callable[[Equilibrium], None],
         on_progress: Callable[[float, int, float], None] | None,
     ) -> None:
         self.system = system
         self.options = options
+        self.on_equilibrium = on_equilibrium
         self.on_progress = on_progress
         self.linear: LinearSolver = make_linear_solver(system.pattern.row_start, system.pattern.column)
         self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
         self.before: Equilibrium | None = None
         self.step = options.largest_step
-        self._residuals: list[float] = []
-        self._factorisations = 0
+        self._tally = Tally()
         self._failures = 0
 
-    @property
-    def has_moved(self) -> bool:
-        """Whether equilibria were found since the last arrival."""
-        return bool(self._factorisations)
-
-    def arrival(self) -> Equilibrium:
-        """Return the equilibrium reached, with the work of all steps since the last arrival."""
-        last = self.here
-        residuals = (*self._residuals, last.residuals[-1])
-        whole = Equilibrium(last.state, last.fraction, residuals, self._factorisations, last.negative_pivots)
-        self._residuals, self._factorisations = [], 0
-        return whole
+    def deliver(self) -> None:
+        """Hand out the equilibrium reached, with the work of all steps since the last one; not a second time."""
+        if not self._tally.is_empty:
+            self.on_equilibrium(self._tally.closed(self.here))
 
     def settle(self) -> None:
         """Find the equilibrium at load fraction zero under what acts from the start."""
         try:
             self._arrive(self._attempt(0.0, self.here.state))
         except NotConvergedError as error:
-            raise self._stopped(error) from error
+            raise stopped(self.system, self.here, error) from error
 
     def to(self, target: float) -> None:
         """Walk to the load fraction `target`."""
@@ -182,16 +178,18 @@ class _Walk:
                 aim = target
             found = self._try(aim, target)
             if found is not None:
-                self.before = self.here
+                # A snap leads nowhere that could be gone on with.
+                self.before = None if found.event is Event.POST_SNAP else self.here
                 self._arrive(found)
+        if target in self.system.kinks:
+            # Beyond it the path turns: what lies before says nothing of the direction.
+            self.before = None
 
     def _arrive(self, found: Equilibrium) -> None:
         self.here = found
-        self._count(found)
-
-    def _count(self, found: Equilibrium) -> None:
-        self._residuals += found.residuals[:-1]
-        self._factorisations += found.factorisations
+        self._tally.count(found)
+        if found.event:
+            self.deliver()
 
     def _try(self, aim: float, target: float) -> Equilibrium | None:
         """Attempt one step towards `target`; shorten the next and return ``None`` if it fails."""
@@ -206,9 +204,36 @@ class _Walk:
             log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
             self.step = CUT * size
             return None
+        if self._may_have_jumped(found):
+            log.info("step to %.4g may have passed over a limit", aim)
+            return self._failed(size, target, NotConvergedError("the path has a jump"))
         if found.iterations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
-        return found
+        return self._bifurcated(found) if found.stable is False and self.here.stable is not False else found
+
+    def _bifurcated(self, found: Equilibrium) -> Equilibrium:
+        """Mark the first state behind a bifurcation: the inertia has changed, and the load has no limit there."""
+        mode = softest_mode(self.system, self.linear, found)
+        log.warning("bifurcation between %.5g and %.5g of the load", self.here.fraction, found.fraction)
+        return replace(found, event=Event.BIFURCATION, mode=mode)
+
+    def _may_have_jumped(self, found: Equilibrium) -> bool:
+        """Whether a step may have passed over a limit, to a branch behind it.
+
+        The load is a smooth function of its conjugate, also through limits. The cubic with the values and slopes
+        (inverse compliances) of both ends rises all the way if the slopes, in parts of the mean one, lie in a circle of
+        radius three (Fritsch and Carlson 1980). It is asked for only where the conjugate has changed much.
+        """
+        system, linear, here = self.system, self.linear, self.here
+        growth = system.growth(here.fraction)
+        before, after = (system.conjugate(e.state, growth) for e in (here, found))
+        if abs(after - before) <= LARGE_CHANGE * abs(before):
+            return False
+        mean = (after - before) / (found.fraction - here.fraction)
+        slopes = [mean / compliance(system, linear, found, growth)]
+        factorise_tangent(system, linear, here.state)
+        slopes.append(mean / compliance(system, linear, here, growth))
+        return math.hypot(*slopes) > MONOTONE
 
     def _failed(self, size: float, target: float, error: NotConvergedError) -> Equilibrium | None:
         """Shorten the step; where that has not helped, go on by volume control."""
@@ -219,7 +244,7 @@ class _Walk:
             if found is not None:
                 return found
         if self.step < self.options.smallest_step:
-            raise self._stopped(error) from error
+            raise stopped(self.system, self.here, error) from error
         return None
 
     def _by_volume(self, target: float) -> Equilibrium | None:
@@ -233,20 +258,20 @@ class _Walk:
             If the load has a maximum before `target`.
         """
         log.info("going on by volume control from %.4g", self.here.fraction)
-        system = self.system
-        now = system.conjugate(self.here.state)
-        rest = system.conjugate(self.before.state if self.before else system.reference_state())
-        step = 0.5 * abs(now - rest) or 0.05 * abs(now)
+        system, quantity = self.system, Volume(self.system.growth(self.here.fraction))
+        rest = self.before.state if self.before else system.reference_state()
+        now, then = (system.conjugate(state, quantity.weights) for state in (self.here.state, rest))
+        step = 0.5 * abs(now - then) or 0.05 * abs(now)
         if step == 0.0:
             return None
-        walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton)
+        walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton, quantity)
         previous = walk.here
         for found in itertools.islice(walk, VOLUME_STEPS):
-            self._count(found)
+            self._tally.count(found)
             if self.on_progress is not None:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
             if previous.rising and not found.rising:
-                raise self._at_limit(walk.limit_between(previous, found))
+                return self._passed(walk, walk.limit_between(previous, found), found)
             if found.fraction >= target:
                 try:
                     return self._attempt(target, found.state)
@@ -255,6 +280,15 @@ class _Walk:
             self.before, self.here = previous, found
             previous = found
         return None
+
+    def _passed(self, walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> Equilibrium:
+        """Deliver a limit; then find the state that the actuator snaps to, or raise."""
+        self._arrive(replace(limit.equilibrium, event=limit.event, mode=limit.mode))
+        if not self.options.post_snap:
+            raise at_limit(self.system, limit)
+        found = after_snap(walk, limit, beyond, self._tally)
+        self._failures, self.step = 0, self.options.largest_step
+        return found
 
     def _attempt(self, aim: float, guess: State) -> Equilibrium:
         def report(iteration: int, residual: float) -> None:
@@ -268,7 +302,7 @@ class _Walk:
                 return found
             penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
             log.info("overlap of %.2g of the wall: contact made stiffer, factor %.3g", overlap, penalty)
-            self._count(found)
+            self._tally.count(found)
             stiffer = replace(found.state, penalty=penalty)
             found = find_equilibrium(self.system, self.linear, stiffer, aim, self.options.newton, report)
         raise NotConvergedError(
@@ -288,41 +322,6 @@ class _Walk:
         reach *= self.system.longest_step(here.state, reach * (here.state.u - self.before.state.u))
         predicted = here.state.beyond(self.before.state, reach)
         return predicted if self.system.worst_jacobian(predicted.u)[0] > 0.0 else here.state
-
-    def _stopped(self, error: NotConvergedError) -> StoppedShortError:
-        facts = self._facts()
-        return StoppedShortError(
-            f"no equilibrium was found beyond {_load_text(facts)} ({error.reason})",
-            advice=(
-                "The material may lose its stability there, or the mesh may be too coarse where it is most distorted"
-            ),
-            facts=facts | error.facts,
-        )
-
-    def _at_limit(self, limit: LimitPoint) -> LimitPressureError:
-        self._arrive(limit.equilibrium)
-        facts = self._facts()
-        worst = int(np.argmax(np.linalg.norm(limit.mode, axis=1)))
-        facts["mode_largest_at_mm"] = [round(float(x), 3) for x in self.system.mesh.points[worst]]
-        return LimitPressureError(
-            f"the limit is reached at {_load_text(facts)}: beyond it the actuator grows while the pressure falls",
-            advice="A thicker wall, a stiffer or a stiffening material raises the limit",
-            facts=facts,
-            limit=limit,
-        )
-
-    def _facts(self) -> dict[str, object]:
-        here = self.here
-        facts: dict[str, object] = {"last_fraction": here.fraction, "last_stable": here.stable}
-        for load, name, value in zip(self.system.loads, self.system.load_names, here.state.loads, strict=True):
-            pressure = isinstance(load, Pressure)
-            facts[f"{name}_kPa" if pressure else name] = float(value) * (1e3 if pressure else 1.0)
-        return facts
-
-
-def _load_text(facts: dict[str, object]) -> str:
-    pressures = [f"{value:.4g} kPa in {name[9:-4]}" for name, value in facts.items() if name.startswith("pressure:")]
-    return ", ".join(pressures) or f"{facts['last_fraction']:.4g} of the load"
 
 
 def _overlap(system: System, state: State) -> float:

@@ -10,14 +10,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.common.log import logger
 from turgor.fem.system import System
-from turgor.solver.control import FixedConjugate
+from turgor.solver.control import Quantity, Volume
+from turgor.solver.events import Event
 from turgor.solver.linear import LinearSolver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
 
 log = logger("solver")
+
+Floats = NDArray[np.float64]
+
+SLACK = 0.2
+"""A step that would leave less than this part of itself to a limit goes there."""
+
+EASY = 5
+"""A step that took no more iterations than this lets the next one grow."""
+
+INVERSE_ITERATIONS = 12
 
 SMALLEST_PART = 1e-3
 """A step is not cut below this part of the first one."""
@@ -39,11 +51,16 @@ class LimitPoint:
 
     equilibrium: Equilibrium
     maximum: bool
-    mode: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    mode: Floats
+
+    @property
+    def event(self) -> Event:
+        """What the state is on its path."""
+        return Event.LIMIT if self.maximum else Event.MINIMUM
 
 
 class VolumeWalk:
-    """Equilibria at growing volume, from a first one on.
+    """Equilibria at growing (or, with a negative step, shrinking) volume, or amount of air, from a first one on.
 
     Parameters
     ----------
@@ -52,40 +69,62 @@ class VolumeWalk:
     start
         An equilibrium; the walk goes on from it.
     step
-        First step of the conjugate, N mm.
+        First step of the quantity: for the conjugate, N mm.
     options
         Tolerance and iteration limit of each equilibrium.
+    quantity
+        What is prescribed.
     """
 
     def __init__(
-        self, system: System, linear: LinearSolver, start: Equilibrium, step: float, options: NewtonOptions
+        self,
+        system: System,
+        linear: LinearSolver,
+        start: Equilibrium,
+        step: float,
+        options: NewtonOptions,
+        quantity: Quantity | None = None,
     ) -> None:
         self.system = system
         self.linear = linear
         self.options = options
-        self.here = start if start.compliance is not None else self._with_compliance(start)
+        self.quantity = quantity or Volume()
+        self.here = start if start.compliance is not None else self.with_compliance(start)
         self.before: Equilibrium | None = None
         self.step = self.first_step = step
+        self.failure: NotConvergedError | None = None
 
     def __iter__(self) -> Iterator[Equilibrium]:
         """Yield one equilibrium after the other; ends where not even a small step finds one."""
-        while True:
-            aim = self.system.conjugate(self.here.state) + self.step
+        while (found := self.advance()) is not None:
+            yield found
+
+    def advance(self, limit: float | None = None) -> Equilibrium | None:
+        """Return the next equilibrium, not beyond a value of the quantity; ``None`` where no step finds one."""
+        while abs(self.step) >= SMALLEST_PART * abs(self.first_step):
+            now = self.measure(self.here)
+            whole = limit is not None and (limit - now) / self.step < 1.0 + SLACK
+            aim = limit if whole and limit is not None else now + self.step
             try:
                 found = self.at(aim)
             except NotConvergedError as error:
                 log.info("volume step failed: %s", error.reason)
-                self.step *= 0.4
-                if self.step < SMALLEST_PART * self.first_step:
-                    return
+                self.failure = error
+                self.step = 0.4 * (aim - now)
                 continue
-            if found.iterations <= 5:
-                self.step *= 1.4
+            if found.iterations <= EASY:
+                self.step = max(self.step, 1.4 * (aim - now), key=abs)
             self.before, self.here = self.here, found
-            yield found
+            return found
+        return None
 
-    def at(self, conjugate: float) -> Equilibrium:
-        """Return the equilibrium at a given conjugate, predicted from the last two.
+    def measure(self, equilibrium: Equilibrium) -> float:
+        """Return the quantity at an equilibrium."""
+        conjugate = self.system.conjugate(equilibrium.state, self.quantity.weights)
+        return self.quantity.value(conjugate, equilibrium.fraction)
+
+    def at(self, value: float) -> Equilibrium:
+        """Return the equilibrium at a given value of the quantity, predicted from the last two.
 
         Raises
         ------
@@ -95,16 +134,16 @@ class VolumeWalk:
         here, before = self.here, self.before
         guess, fraction = here.state, here.fraction
         if before is not None:
-            last = self.system.conjugate(here.state)
-            reach = (conjugate - last) / (last - self.system.conjugate(before.state))
+            last = self.measure(here)
+            reach = (value - last) / (last - self.measure(before))
             predicted = here.state.beyond(before.state, reach)
             if self.system.worst_jacobian(predicted.u)[0] > 0.0:
                 guess = predicted
                 fraction += reach * (here.fraction - before.fraction)
-        control = FixedConjugate(conjugate)
+        control = self.quantity.fixed(value)
         found = find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
         # A prediction that needed no iteration has not been asked for its compliance yet.
-        return found if found.compliance is not None else self._with_compliance(found)
+        return found if found.compliance is not None else self.with_compliance(found)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between two equilibria of the walk whose compliances differ in sign.
@@ -112,7 +151,7 @@ class VolumeWalk:
         The load fraction is stationary where its slope by the conjugate, the inverse of the compliance, vanishes; the
         secant of the slopes finds the place, safeguarded by halving.
         """
-        ends = [(self.system.conjugate(e.state), 1.0 / _compliance(e), e) for e in (first, second)]
+        ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
         span = ends[1][0] - ends[0][0]
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1]))[2]
         for _ in range(30):
@@ -125,24 +164,40 @@ class VolumeWalk:
             ends[0 if slope * s0 > 0 else 1] = (aim, slope, best)
             if abs(slope) * span <= tolerance * abs(best.fraction):
                 break
-        return LimitPoint(best, ends[0][1] > 0, self._mode(best))
+        return LimitPoint(best, ends[0][1] > 0, softest_mode(self.system, self.linear, best))
 
-    def _with_compliance(self, equilibrium: Equilibrium) -> Equilibrium:
+    def with_compliance(self, equilibrium: Equilibrium) -> Equilibrium:
+        """Return an equilibrium with its compliance, for which the tangent is factorised once more."""
         factorise_tangent(self.system, self.linear, equilibrium.state)
-        direction = self.system.load_direction(equilibrium.state)
-        response = self.linear.solve(self.system.free_part(direction))
-        return replace(equilibrium, compliance=float(self.system.free_part(direction) @ response))
+        found = compliance(self.system, self.linear, equilibrium, self.quantity.weights)
+        return replace(equilibrium, compliance=found)
 
-    def _mode(self, equilibrium: Equilibrium) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        """Return the eigenmode of the smallest eigenvalue in size, by inverse iteration."""
-        factorise_tangent(self.system, self.linear, equilibrium.state)
-        vector = self.system.free_part(self.system.load_direction(equilibrium.state))
-        for _ in range(4):
-            vector = self.linear.solve(vector)
-            vector /= np.linalg.norm(vector)
-        mode = self.system.nodal(vector)
-        largest = mode.ravel()[np.argmax(np.abs(mode))]
-        return np.asarray(mode / largest)
+
+def compliance(system: System, linear: LinearSolver, equilibrium: Equilibrium, weights: Floats | None) -> float:
+    """Return dQ/df along the path of equilibria, by the tangent that was factorised last."""
+    growth = system.growth(equilibrium.fraction)
+    response = linear.solve(system.free_part(system.load_direction(equilibrium.state, growth)))
+    return float(system.free_part(system.load_direction(equilibrium.state, weights)) @ response)
+
+
+def softest_mode(system: System, linear: LinearSolver, equilibrium: Equilibrium) -> Floats:
+    """Return the eigenmode of the tangent's smallest eigenvalue in size, ``(n_points, d)``, largest component one.
+
+    By inverse iteration, from the load's direction and a little of everything: at a bifurcation the load has no part
+    in the mode.
+    """
+    factorise_tangent(system, linear, equilibrium.state)
+    vector = system.free_part(system.load_direction(equilibrium.state, system.growth(equilibrium.fraction)))
+    noise = np.random.default_rng(0).standard_normal(len(vector))
+    vector = vector + 0.1 * float(np.linalg.norm(vector)) / np.sqrt(len(vector)) * noise
+    if not np.any(vector):
+        vector = noise
+    for _ in range(INVERSE_ITERATIONS):
+        vector = linear.solve(vector)
+        vector /= np.linalg.norm(vector)
+    mode = system.nodal(vector)
+    largest = mode.ravel()[np.argmax(np.abs(mode))]
+    return np.asarray(mode / largest)
 
 
 def _compliance(equilibrium: Equilibrium) -> float:

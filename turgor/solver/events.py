@@ -1,0 +1,26 @@
+"""What makes a state special on its path, and how a path may end."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Event(StrEnum):
+    """A state that nobody asked for and everybody wants to know of."""
+
+    LIMIT = "limit-pressure"
+    MINIMUM = "pressure-minimum"
+    BIFURCATION = "bifurcation"
+    POST_SNAP = "post-snap"
+
+
+class Outcome(StrEnum):
+    """How a path ended."""
+
+    REACHED = "target-reached"
+    LIMIT = "limit-pressure"
+    BIFURCATION = "bifurcation"
+    MATERIAL = "material-unstable"
+    MESH = "mesh-distorted"
+    CONTACT = "contact"
+    UNEXPLAINED = "not-converged"

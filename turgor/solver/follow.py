@@ -1,0 +1,282 @@
+"""The path by volume, by an amount of air or by arc length: through limits, to states of given size."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from turgor.common.errors import InputError
+from turgor.common.log import logger
+from turgor.fem.system import System
+from turgor.solver.control import ArcLength, Quantity, Volume
+from turgor.solver.linear import make_linear_solver
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+from turgor.solver.stops import StoppedShortError, stopped
+from turgor.solver.tally import Tally
+from turgor.solver.volume import LimitPoint, VolumeWalk
+
+log = logger("solver")
+
+OnEquilibrium = Callable[[Equilibrium], None]
+OnProgress = Callable[[float, int, float], None]
+
+FIRST_STEP = 0.3
+"""First step of a walk from rest, in parts of what the quantity is there."""
+
+ARC_CUTS = 10
+"""How often a step along the arc is halved before the path is given up."""
+
+
+def follow(
+    system: System,
+    quantity: Quantity,
+    targets: Sequence[float],
+    *,
+    options: NewtonOptions | None = None,
+    start: Equilibrium | None = None,
+    on_equilibrium: OnEquilibrium | None = None,
+    on_progress: OnProgress | None = None,
+) -> list[Equilibrium]:
+    """Bring the system into equilibrium at each of the given values of a quantity, the load being what it must be.
+
+    Parameters
+    ----------
+    system
+        The actuator; its loads follow the load fraction in proportion.
+    quantity
+        What is prescribed: :class:`turgor.solver.control.Volume` or :class:`turgor.solver.control.Air`.
+    targets
+        Values of the quantity, all above or all below that at the start, in order; each is hit exactly.
+    options
+        Tolerance and iteration limit of each equilibrium.
+    start
+        An equilibrium of the same system to go on from; targets that it has reached are skipped.
+    on_equilibrium
+        Called with each state as soon as it is reached.
+    on_progress
+        Called after every step with the part of the way done, the iterations and the residual.
+
+    Returns
+    -------
+    list of Equilibrium
+        The states at the targets, and the limits of the load between them, located and with their mode.
+
+    Raises
+    ------
+    InputError
+        If the targets are not in order, or given displacements grow with the load.
+    StoppedShortError
+        If the walk ends before the last target; the last equilibrium found has been delivered too.
+    """
+    walk = _walk_from(system, quantity, options or NewtonOptions(), start)
+    begin = walk.measure(walk.here)
+    sign = _direction(begin, targets, start is not None)
+    walk.step = walk.first_step = sign * _first_step(begin, targets)
+    post = _Post(on_equilibrium)
+    if start is None and system.loaded_at_start:
+        post.send(walk.here)
+    for target in targets:
+        while sign * (target - walk.measure(walk.here)) > _rounding(target):
+            previous = walk.here
+            found = walk.advance(target)
+            if found is None:
+                raise _ended(walk, post)
+            post.tally.count(found)
+            if on_progress is not None:
+                part = (walk.measure(found) - begin) / (targets[-1] - begin)
+                on_progress(part, found.iterations, found.residuals[-1])
+            if previous.rising != found.rising:
+                post.send_limit(walk.limit_between(previous, found))
+                walk.before, walk.here = previous, found
+        if not post.tally.is_empty:
+            post.send(walk.here)
+    return post.sent
+
+
+def follow_arc(
+    system: System,
+    volume: Volume,
+    target: float,
+    length: float,
+    *,
+    options: NewtonOptions | None = None,
+    start: Equilibrium | None = None,
+    on_equilibrium: OnEquilibrium | None = None,
+    on_progress: OnProgress | None = None,
+) -> list[Equilibrium]:
+    """Follow the path by its arc length until the volume has a given value, which is hit exactly.
+
+    Parameters
+    ----------
+    system, options, start, on_equilibrium, on_progress
+        As for :func:`follow`.
+    volume
+        The measure of volume.
+    target
+        Its value at the end.
+    length
+        Distance between the states delivered, in the plane of volume and load fraction; along the first the way from
+        rest to the target counts as one.
+
+    Returns
+    -------
+    list of Equilibrium
+        The states, and the limits of the load between them where the volume grows through them.
+
+    Raises
+    ------
+    InputError, StoppedShortError
+        As for :func:`follow`.
+    """
+    options = options or NewtonOptions()
+    walk = _walk_from(system, volume, options, start)
+    rest = volume.value(system.conjugate(system.reference_state(), volume.weights), 0.0)
+    scale = abs(target - rest)
+    sign = _direction(walk.measure(walk.here), [target], start is not None)
+    post = _Post(on_equilibrium)
+    if start is None and system.loaded_at_start:
+        post.send(walk.here)
+    arc = _Arc(walk, sign, scale, length)
+    while sign * (target - walk.measure(walk.here)) > _rounding(target):
+        previous = walk.here
+        found = arc.advance()
+        if found is None:
+            raise _ended(walk, post)
+        if sign * (walk.measure(found) - target) > 0.0:
+            # The end is cut by volume; between the two the path is as good as straight.
+            walk.before, walk.here = walk.here, found
+            found = walk.at(target)
+        post.tally.count(found)
+        if on_progress is not None:
+            on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
+        if previous.rising != found.rising and sign * (walk.measure(found) - walk.measure(previous)) > 0.0:
+            turned = arc.turned
+            if turned:
+                post.send_limit(walk.limit_between(previous, found))
+        walk.before, walk.here = previous, found
+        post.send(found)
+    return post.sent
+
+
+class _Arc:
+    """Steps of a given length in the plane of volume and load fraction, each in the direction of the last one."""
+
+    def __init__(self, walk: VolumeWalk, sign: float, scale: float, length: float) -> None:
+        self.walk, self.scale, self.length = walk, scale, length
+        here = walk.here
+        assert here.compliance is not None
+        # From rest the path sets out along the tangent, dQ/df being the compliance.
+        way = np.array([here.compliance / scale, 1.0])
+        self.direction = sign * np.sign(way[0]) * way / np.linalg.norm(way)
+        self.turned = False
+
+    def advance(self) -> Equilibrium | None:
+        """Return the next state, or ``None`` where even short steps find none."""
+        length = self.length
+        for _ in range(ARC_CUTS):
+            try:
+                found = self._at(length)
+            except NotConvergedError as error:
+                log.info("arc-length step failed: %s", error.reason)
+                self.walk.failure = error
+                length *= 0.5
+                continue
+            way = self._way(found)
+            if float(way @ self.direction) <= 0.0:
+                log.info("arc-length step turned back")
+                length *= 0.5
+                continue
+            before = self.direction
+            self.direction = way / np.linalg.norm(way)
+            self.turned = bool(before[1] * self.direction[1] < 0.0)
+            return found
+        return None
+
+    def _at(self, length: float) -> Equilibrium:
+        walk = self.walk
+        here, before = walk.here, walk.before
+        guess, aim = here.state, here.fraction + length * float(self.direction[1])
+        if before is not None:
+            reach = length / float(np.linalg.norm(self._way(here, before)))
+            predicted = here.state.beyond(before.state, reach)
+            if walk.system.worst_jacobian(predicted.u)[0] > 0.0:
+                guess, aim = predicted, here.fraction + reach * (here.fraction - before.fraction)
+        control = ArcLength(walk.measure(here), here.fraction, self.scale, 1.0, length, walk.quantity.weights)
+        found = find_equilibrium(walk.system, walk.linear, guess, aim, walk.options, control=control)
+        return found if found.compliance is not None else walk.with_compliance(found)
+
+    def _way(
+        self, to: Equilibrium, since: Equilibrium | None = None
+    ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        since = since or self.walk.here
+        return np.array([(self.walk.measure(to) - self.walk.measure(since)) / self.scale, to.fraction - since.fraction])
+
+
+class _Post:
+    """Hands out equilibria with the work that led to them, and remembers them."""
+
+    def __init__(self, on_equilibrium: OnEquilibrium | None) -> None:
+        self.tally = Tally()
+        self.sent: list[Equilibrium] = []
+        self._on_equilibrium = on_equilibrium
+
+    def send(self, equilibrium: Equilibrium) -> None:
+        """Hand out an equilibrium."""
+        self.sent.append(self.tally.closed(equilibrium))
+        if self._on_equilibrium is not None:
+            self._on_equilibrium(self.sent[-1])
+
+    def send_limit(self, limit: LimitPoint) -> None:
+        """Hand out a limit of the load."""
+        log.info("limit of the load at %.5g", limit.equilibrium.fraction)
+        self.send(replace(limit.equilibrium, event=limit.event, mode=limit.mode))
+
+
+def _walk_from(system: System, quantity: Quantity, options: NewtonOptions, start: Equilibrium | None) -> VolumeWalk:
+    if system.constraints.moves:
+        raise InputError("given displacements cannot grow where the load is what it must be", key="control")
+    if system.kinks:
+        raise InputError("loads with a programme follow time, not a volume", key="control")
+    linear = make_linear_solver(system.pattern.row_start, system.pattern.column)
+    if start is None:
+        rest = system.reference_state()
+        start = Equilibrium(rest, 0.0, (0.0,), 0, 0)
+        if system.loaded_at_start:
+            try:
+                start = find_equilibrium(system, linear, rest, 0.0, options)
+            except NotConvergedError as error:
+                raise stopped(system, start, error) from error
+    return VolumeWalk(system, linear, start, 1.0, options, quantity)
+
+
+def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
+    """Return the sign in which the targets lie."""
+    sign = float(np.sign(targets[-1] - begin)) if len(targets) else 0.0
+    ahead = [begin, *(t for t in targets if sign * (t - begin) > 0.0)] if going_on else [begin, *targets]
+    if sign == 0.0 and going_on:
+        return 1.0
+    if sign == 0.0 or any(sign * (b - a) <= 0.0 for a, b in itertools.pairwise(ahead)):
+        raise InputError("the targets must lead away from the start, in order", key="targets", value=list(targets))
+    return sign
+
+
+def _first_step(begin: float, targets: Sequence[float]) -> float:
+    return min(abs(targets[-1] - begin), FIRST_STEP * abs(begin) or np.inf)
+
+
+def _rounding(target: float) -> float:
+    return 1e-6 * abs(target)
+
+
+def _ended(walk: VolumeWalk, post: _Post) -> StoppedShortError:
+    if not post.tally.is_empty:
+        post.send(walk.here)
+    return stopped(walk.system, walk.here, walk.failure or NotConvergedError("the path turns back"))
+
+
+def steps_between(first: float, last: float, count: int) -> Iterator[float]:
+    """Yield `count` equal steps from `first`, not itself, to exactly `last`."""
+    yield from (float(x) for x in np.linspace(first, last, count + 1)[1:])

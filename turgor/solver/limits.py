@@ -1,0 +1,98 @@
+"""Behind a limit: the state that an actuator snaps to while its pressures stay."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+from turgor.common.log import logger
+from turgor.solver.events import Event
+from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
+from turgor.solver.stops import Facts, at_limit, worst_point
+from turgor.solver.tally import Tally
+from turgor.solver.volume import LimitPoint, VolumeWalk
+
+log = logger("solver")
+
+SNAP_STEPS = 80
+"""Steps that the walk along the falling branch may take."""
+
+MOST_VOLUMES = 1000.0
+"""Growth of the volume beyond which no rubber goes: tenfold stretch in every direction of a wall."""
+
+REFINEMENTS = 12
+
+
+def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: Tally) -> Equilibrium:
+    """Follow the falling branch until it has risen to the loads of its limit again, and return the state there.
+
+    Parameters
+    ----------
+    walk
+        The walk that passed the limit.
+    limit, beyond
+        The limit, and the first state of the walk behind it.
+    tally
+        Counts the work.
+
+    Raises
+    ------
+    StoppedShortError
+        If the branch does not rise to the limit again as far as it could be followed.
+    """
+    goal = limit.equilibrium.fraction
+    walk.before, walk.here = limit.equilibrium, beyond
+    rest = abs(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights))
+    previous, lowest = beyond, beyond.fraction
+    ended = f"after {SNAP_STEPS} steps"
+    for found in itertools.islice(walk, SNAP_STEPS):
+        tally.count(found)
+        log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
+        if found.fraction >= goal:
+            try:
+                return _at_load(walk, goal, previous, found, tally)
+            except NotConvergedError as error:
+                ended = f"and the state at the limit's loads was enclosed but not found ({error.reason})"
+                break
+        previous, lowest = found, min(lowest, found.fraction)
+        if rest and abs(walk.measure(found)) > MOST_VOLUMES * rest:
+            ended = "at a volume that no rubber reaches"
+            break
+    else:
+        if walk.failure is not None and abs(walk.step) < abs(walk.first_step):
+            ended = f"where the walk ended ({walk.failure.reason})"
+    raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, rest, ended))
+
+
+def _at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
+    """Return the equilibrium at a load fraction between two states of the walk, the load given."""
+    for _ in range(REFINEMENTS):
+        part = (goal - below.fraction) / (above.fraction - below.fraction)
+        guess = above.state.beyond(below.state, part - 1.0)
+        try:
+            found = find_equilibrium(walk.system, walk.linear, guess, goal, walk.options)
+        except NotConvergedError:
+            walk.before, walk.here = below, above
+            middle = walk.at(0.5 * (walk.measure(below) + walk.measure(above)))
+            tally.count(middle)
+            below, above = (middle, above) if middle.fraction < goal else (below, middle)
+            continue
+        return replace(found, event=Event.POST_SNAP)
+    raise NotConvergedError(f"no equilibrium after {REFINEMENTS} refinements")
+
+
+def _why(walk: VolumeWalk, last: Equilibrium, lowest: float, rest: float, ended: str) -> tuple[str, Facts]:
+    """Say how far the branch behind a limit was followed, and what it was like there."""
+    ratio = abs(walk.measure(last)) / rest if rest else float("nan")
+    worst = worst_point(walk.system, last)
+    text = (
+        f"; behind it no state under the same loads was found: the branch was followed to {ratio:.3g} times the volume "
+        f"at rest, {ended}, without the pressure rising to the limit again (lowest {100.0 * lowest:.3g} % of it)"
+    )
+    facts: Facts = {
+        "followed_to_volume_ratio": ratio,
+        "lowest_load_behind_limit": lowest,
+        "drucker_margin_behind_limit": worst.margin,
+        "stretches_behind_limit": list(worst.stretches),
+    }
+    return text, facts

@@ -1,0 +1,31 @@
+"""The work of several steps, told as that of the equilibrium they lead to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from turgor.solver.newton import Equilibrium
+
+
+class Tally:
+    """Counts iterations and factorisations between two equilibria that are delivered."""
+
+    def __init__(self) -> None:
+        self._residuals: list[float] = []
+        self._factorisations = 0
+
+    def count(self, found: Equilibrium) -> None:
+        """Add the work that went into an equilibrium."""
+        self._residuals += found.residuals[:-1]
+        self._factorisations += found.factorisations
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was done since the last equilibrium that was delivered."""
+        return not self._factorisations
+
+    def closed(self, last: Equilibrium) -> Equilibrium:
+        """Return the last equilibrium with the work of all since the one before, and begin anew."""
+        whole = replace(last, residuals=(*self._residuals, last.residuals[-1]), factorisations=self._factorisations)
+        self._residuals, self._factorisations = [], 0
+        return whole
