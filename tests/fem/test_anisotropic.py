@@ -103,7 +103,8 @@ def test_slack_fibres_carry_nothing():
     for tension_only in (True, False):
         fibres = family(LAWS[0], Constant((1.0, 0.0, 0.0)), tension_only=tension_only)
         system = System(mesh, {"body": neo_hookean()}, [*PLANES, Prescribed("x1", (-0.2, None, None))], [], [fibres])
-        found = solve_path(system, [1.0])[0]
+        # Fibres that take compression lose their stability on the way, which is a state of its own on the path.
+        found = solve_path(system, [1.0])[-1]
         pulls.append(system.forces(found.state)[0][mesh.surface_nodes("x1"), 0].sum())
     alone = 0.1 * (0.8 - 0.8**-2)
     assert pulls[0] == pytest.approx(alone, rel=1e-3)

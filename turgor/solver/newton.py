@@ -110,9 +110,12 @@ ROUNDING = 1e-9
 
 RISE = 2.0
 RISES = 3
-"""An iteration whose residual has risen so many times by such a factor is given up. Of 352 iterations that converged (the
-tests, a finger whose walls touch, random actuators) none had a rise by half of itself; of those that did not, a fifth
-had three or more and spent a third of all their factorisations behind the third."""
+"""An iteration whose residual has risen so many times by such a factor is given up.
+
+Of 352 iterations that converged (the tests, a finger whose walls touch, random actuators) none had a single rise by
+half of itself; of those that did not, a fifth had three or more, and spent a third of all factorisations behind the
+third.
+"""
 
 NEAR = 1e-2
 """A tangent at a relative residual below this speaks for the equilibrium that the iteration then reaches."""

@@ -229,11 +229,13 @@ class _Walk:
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
         if abs(after - before) <= LARGE_CHANGE * abs(before):
             return False
-        mean = (after - before) / (found.fraction - here.fraction)
-        slopes = [mean / compliance(system, linear, found, growth)]
+        at_end = compliance(system, linear, found, growth)
         factorise_tangent(system, linear, here.state)
-        slopes.append(mean / compliance(system, linear, here, growth))
-        return math.hypot(*slopes) > MONOTONE
+        at_start = compliance(system, linear, here, growth)
+        if min(at_start, at_end) <= 0.0:
+            return False  # nothing gives way to the loads yet, as before a body is touched
+        mean = (after - before) / (found.fraction - here.fraction)
+        return math.hypot(mean / at_start, mean / at_end) > MONOTONE
 
     def _failed(self, size: float, target: float, error: NotConvergedError) -> Equilibrium | None:
         """Shorten the step; where that has not helped, go on by volume control."""
