@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         PneuNet,
         ReinforcedTube,
         StepFile,
+        preview,
     )
     from turgor.study.specimen import read_tests
 
@@ -75,6 +76,7 @@ __all__ = [
     "mesh_case",
     "mesh_quality",
     "models",
+    "preview",
     "read_tests",
     "run",
     "template",
@@ -110,6 +112,7 @@ _HOMES = {
         "PneuNet",
         "ReinforcedTube",
         "StepFile",
+        "preview",
     ),
     "turgor.study.specimen": ("read_tests",),
 }

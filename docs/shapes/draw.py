@@ -1,8 +1,9 @@
-"""Draw the pictures of docs/shapes.md: the mesh of every template, cut open where that shows more."""
+"""Draw the pictures of docs/shapes.md: dimensions and mesh of every template, cut open where that shows more."""
 
 from pathlib import Path
 
 from turgor.geometry.catalogue import actuator
+from turgor.mesh.drawing import save_drawing
 from turgor.mesh.generate import generate
 from turgor.mesh.picture import save_picture
 
@@ -19,5 +20,6 @@ PICTURES = {
 
 if __name__ == "__main__":
     for name, (parameters, size, cut) in PICTURES.items():
+        save_drawing(actuator(name), Path(__file__).parent / f"{name}-drawing.png")
         mesh = generate(actuator(name, **parameters), size)
         save_picture(mesh, Path(__file__).parent / f"{name}.png", cut=cut, window=(900, 580))

@@ -191,6 +191,15 @@ def test_materials() -> None:
     assert "constants" in turgor("materials", names[0]).stdout
 
 
+def test_a_preview_is_a_picture(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.png"
+    changes = ("--set", "wall=2 mm", "--set", "model=axisymmetric")
+    assert turgor("templates", "tube", "--preview", *changes, "--out", path).stdout.strip() == str(path)
+    assert path.read_bytes()[:4] == b"\x89PNG"
+    refused = turgor("templates", "tube", "--out", path)
+    assert (refused.exit_code, "expected --preview" in refused.stderr) == (2, True)
+
+
 def test_templates() -> None:
     described = {entry["template"]: entry for entry in printed("templates", "--json")}
     assert {"tube", "pneunet"} <= set(described)

@@ -169,9 +169,30 @@ def materials(
 @app.command()
 def templates(
     name: Annotated[str | None, typer.Argument(help="One template, with its parameters.", show_default=False)] = None,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Write a picture of it: drawing with all dimensions, and mesh.")
+    ] = False,
+    changes: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Parameter of the preview.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="The picture; NAME.png if left out.", show_default=False)
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the actuator templates, or show the parameters of one."""
+    """List the actuator templates, or show the parameters or a picture of one."""
+    if not preview and (changes or out):
+        raise tg.InputError("--set and --out belong to a picture", expected="--preview")
+    if preview:
+        if not name:
+            raise tg.InputError("a picture is one of a single template", expected="its name before --preview")
+        path = out or Path(f"{name}.png")
+        tg.preview(name, path, changes or ())
+        if as_json:
+            print_json({"template": name, "picture": str(path)})
+        else:
+            print_text(str(path))
+        return
     known = [tg.template(name)] if name else list(tg.templates().values())
     if as_json:
         described = [tables.template_document(template) for template in known]

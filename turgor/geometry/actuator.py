@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
+from turgor.geometry.drawing import View
 from turgor.geometry.section import PlaneSection
 
 FloatArray = npt.NDArray[np.float64]
@@ -113,6 +115,21 @@ class Actuator(BaseModel, ABC):
     def section(self) -> PlaneSection | None:
         """What the drawing stands for if it is plane; None for a body in space."""
         return None
+
+    def views(self) -> Sequence[View]:
+        """Return the views of the dimensioned drawing; a shape that comes from a file has none."""
+        return ()
+
+    def shown(self) -> dict[str, str]:
+        """Return every parameter's value as short text: lengths in mm, angles in degrees, without their units."""
+        values: dict[str, str] = {}
+        for name, text in self.model_dump(mode="json").items():
+            value = getattr(self, name)
+            angle = isinstance(text, str) and text.endswith(" rad")
+            values[name] = (
+                f"{math.degrees(value):g}°" if angle else f"{value:g}" if isinstance(value, float) else str(value)
+            )
+        return values
 
     @property
     @abstractmethod

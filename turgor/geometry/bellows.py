@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.drawing import Distance, Mark, Pointer, Turn, View, along
 from turgor.geometry.path import Piece, Step, offset_path
 from turgor.geometry.section import CUTS, TURN, PlaneSection
 
@@ -117,6 +118,52 @@ class Bellows(Actuator):
     def _top(self) -> float:
         """Height of the middle line of the top."""
         return self._line(0.0)[-1].end[1]
+
+    def views(self) -> list[View]:
+        """Show the section through the axis, all of it and its right half larger."""
+        outside, inside = along(self._line(-0.5 * self.wall)), along(self._line(0.5 * self.wall))
+        half, mirror = np.vstack([outside, inside[::-1]]), np.array([-1.0, 1.0])
+        both = np.vstack([outside, outside[::-1] * mirror, inside * mirror, inside[::-1]])
+        axis = np.array([[0.0, -0.05 * self.height], [0.0, 1.05 * self.height]])
+        crest = float(outside[np.argmax(outside[:, 0]), 1])
+        marks: list[Mark] = [
+            Distance("inlet_radius", (0, 0), (self.inlet_radius, 0), -1),
+            Distance("mount_radius", (0, 0), (self.mount_radius, 0), -2),
+            Distance("crest_radius", (0, crest), (self.crest_radius, crest)),
+            Distance("wall", (0, self.height - self.wall), (0, self.height), 1),
+        ]
+        notes = {
+            "tip-face": (0.5 * self.crest_radius, 1.04 * self.height),
+            "cavity": (0.25 * self.crest_radius, 0.8 * self.height),
+        }
+        whole = View(
+            "section through the axis",
+            [("body", both)],
+            [Pointer("convolutions", (-self.crest_radius, crest), 180)],
+            [axis],
+            notes=notes,
+        )
+        return [whole, View("the right half, larger", [("body", half)], [*marks, *self._fold_marks()], [axis])]
+
+    def _fold_marks(self) -> list[Mark]:
+        """Return what is measured at the first fold: its rounding, slope and, where folds meet, the root."""
+        pieces = self._line(0.0)
+        arcs = [piece for piece in pieces if piece.centre is not None]
+        # The first arc leads from the bottom into the flank, the next ones around the first crest.
+        (x, z), slope = arcs[0].end, self.flank_angle
+        reach = 0.6 * (self._crest - self._root) / math.cos(slope)
+        middle = along(arcs[1:2])[12]
+        marks: list[Mark] = [
+            Turn("flank_angle", (x, z), 0.0, slope, reach),
+            Pointer("rounding", (float(middle[0]), float(middle[1])), 0, 3),
+        ]
+        if self.convolutions > 1:
+            line = along(self._line(-0.5 * self.wall))
+            low, high = 0.25 * self.height / self.convolutions, 1.6 * self.height / self.convolutions
+            among = line[(line[:, 1] > low) & (line[:, 1] < high) & (line[:, 0] <= self.root_radius * (1 + 1e-9))]
+            height = float(among[np.argmin(np.abs(among[:, 0] - self.root_radius)), 1])
+            marks.append(Distance("root_radius", (0, height), (self.root_radius, height), 0))
+        return marks
 
     def draw(self) -> Shape:
         """Draw the wall's section in the plane y = 0 and turn it around z."""

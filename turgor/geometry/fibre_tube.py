@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, Turn, View, circle, rectangle
 
 _THESIS = "Geer, Coiling motion of plant-inspired soft actuators (2019), section 2.2"
 _ASSUMED = "assumed"
@@ -69,6 +70,56 @@ class FibreTube(Actuator):
         if not self._curves():
             value, expected = f"{self.fibre_length:g} mm", "a longer part of the tube"
             raise InputError("no fibre fits on this length", key="fibre_length", value=value, expected=expected)
+
+    def views(self) -> list[View]:
+        """Show the section along the axis, the fibres of one end from the side, and the section across."""
+        inner, between = 0.5 * self.inner_diameter, self.fibre_radius
+        outer, length, low = between + self.outer_layer, self.length, 0.5 * (self.length - self.fibre_length)
+        section = View(
+            "section along the axis",
+            [
+                ("outer-layer", rectangle(0, length, -outer, outer)),
+                ("inner-layer", rectangle(0, length, -between, between)),
+                (AIR, rectangle(self.cap, length - self.cap, -inner, inner)),
+            ],
+            [
+                Distance("length", (0, -outer), (length, -outer), -4),
+                Distance("cap", (0, -outer), (self.cap, -outer), -1),
+                Distance("fibre_length", (low, -outer), (length - low, -outer), -2),
+            ],
+            notes={"mount": (-0.035 * length, 0.0)},
+        )
+        across = View(
+            "section across the axis",
+            [("outer-layer", circle(outer)), ("inner-layer", circle(between)), (AIR, circle(inner))],
+            [
+                Distance("inner_diameter", (-inner, 0), (inner, 0)),
+                Distance("inner_layer", (0, inner), (0, between)),
+                Distance("outer_layer", (0, -outer), (0, -between)),
+                Pointer("winding", (between, 0.0), 0, 3),
+            ],
+        )
+        return [section, self._fibre_view(outer), across]
+
+    def _fibre_view(self, outer: float) -> View:
+        """Show one loop of every fibre where the first has its crossing nearest to the middle of the tube."""
+        radius, middle = self.fibre_radius, 0.5 * self.length
+        lines = [curve[:, [2, 0]] for curve in self._curves().values()]
+        reach = max(2.2 * self.pitch, 2.2 * radius * math.tan(self.tilt), 2.0 * outer)
+        window = (middle - reach, middle + reach, -outer, outer)
+        low = 0.5 * (self.length - self.fibre_length)
+        # On the side x = 0 the first fibre passes at t = 2π k + π/2, a quarter of a pitch beyond whole ones.
+        start = low + self.pitch * (math.floor((middle - low) / self.pitch) + 0.25)
+        tilted = math.pi / 2 - self.tilt
+        marks: list[Mark] = [
+            Distance("pitch", (start, 0.0), (start + self.pitch, 0.0)),
+            Pointer("fibres", (middle - 0.5 * reach, outer), 90, 1.5),
+        ]
+        if self.tilt > 0.0:
+            marks.append(Turn("tilt", (start, 0.0), tilted, math.pi / 2, 0.9 * outer))
+        title = "the fibres in the middle of the tube, seen along y, near and far sides of their loops"
+        area = [("inner-layer", rectangle(0, self.length, -outer, outer))]
+        return View(title, area, marks, fibres=lines, window=window)
 
     def draw(self) -> Shape:
         """Draw the two layers with their common surface, and list the fibres."""

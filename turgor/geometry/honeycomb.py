@@ -9,7 +9,8 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
-from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.drawing import AIR, OUTSIDE, Distance, Mark, Pointer, View, along, rectangle
 from turgor.geometry.path import Piece, rounded_polygon
 from turgor.geometry.section import PlaneSection
 
@@ -117,6 +118,56 @@ class Honeycomb(Actuator):
         left = [corner for row in reversed(rows) for corner in self._cell(0, row)[:2]]
         # Each side begins where the one before ended, and the last ends where the first began.
         return [*below, *right[1:], *above[1:], *left[1:-1]]
+
+    def views(self) -> list[View]:
+        """Show the network in its plane, one cell larger, and the section along the depth."""
+        outside, rooms, cells = self._contours()
+        areas = [
+            ("body", along(outside)),
+            *((OUTSIDE, along(room)) for room in rooms),
+            *((AIR, along(cell)) for cell in cells),
+        ]
+        right, height = self.columns * self.cell_width, self.height
+        middle = (self.columns // 2 + 0.5) * self.cell_width
+        whole = View(
+            "the network in the plane of x and z",
+            areas,
+            [
+                Pointer("columns", (right - 0.5 * self.cell_width, height), 90),
+                Pointer("rows", (0.0, 0.5 * (self.thickness + self.cell_height)), 180),
+            ],
+            notes={"tip-face": (middle, 1.06 * height), "mount": (middle, -0.06 * height)},
+        )
+        return [whole, self._cell_view(areas), self._depth_view()]
+
+    def _cell_view(self, areas: list[tuple[str, FloatArray]]) -> View:
+        corners = self._cell(0, 0)
+        low, high = corners[1][1], corners[4][1]
+        web = 0.5 * (corners[1][0] + corners[2][0])
+        arc = next(piece for piece in self._contours()[2][0] if piece.centre is not None)
+        marks: list[Mark] = [
+            Distance("web_length", (corners[1][0], low), (corners[2][0], low), -2),
+            Distance("cell_width", (corners[0][0], low), (corners[3][0], low), -3),
+            Distance("cell_height", (corners[3][0], low), (corners[3][0], high), -1),
+            Distance("thickness", (web, high - 0.5 * self.thickness), (web, high + 0.5 * self.thickness)),
+            Pointer("rounding", arc.start, 0, 2.5),
+        ]
+        across = self.thickness
+        window = (corners[0][0] - across, corners[3][0] + across, low - across, high + across)
+        middle_line = np.array([*corners, corners[0]])
+        return View("the lower left cell, larger; its middle line", areas, marks, [middle_line], window=window)
+
+    def _depth_view(self) -> View:
+        half, inside, height = 0.5 * self.depth, 0.5 * self.depth - self.end_wall, self.height
+        areas = [("body", rectangle(-half, half, 0.0, height))]
+        for row in range(self.rows):
+            low = row * self.cell_height + self.thickness
+            areas.append((AIR, rectangle(-inside, inside, low, low + self.cell_height - self.thickness)))
+        marks: list[Mark] = [
+            Distance("depth", (-half, 0), (half, 0), -1),
+            Distance("end_wall", (inside, height), (half, height), 1),
+        ]
+        return View("section across x through the middle of a column", areas, marks)
 
     def draw(self) -> Shape:
         """Draw the network in its plane or swept along y, with the cells as holes or closed by end walls."""

@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, circle, rectangle
 from turgor.geometry.path import polygon
 from turgor.geometry.section import CUTS, PlaneSection
 
@@ -72,6 +73,49 @@ class Membrane(Actuator):
         if self.model == "quarter" and self.segments != 1:
             expected = "a single segment, or the model 'half'"
             raise InputError("the quarter is one of a single segment", key="model", value="quarter", expected=expected)
+
+    def views(self) -> list[View]:
+        """Show the section across the chambers, one chamber larger, and the chambers from above."""
+        whole = self.changed(model="full")
+        (half, side, _), levels = whole._corners[1], self._levels
+        areas = [
+            (name, rectangle(-half, half, *levels[number : number + 2]))
+            for number, name in enumerate(("base", "body", "membrane"))
+        ]
+        width, bore, length = 0.5 * self.chamber_width, 0.5 * self.inlet_diameter, 0.5 * self.chamber_length
+        for x in self._middles():
+            areas += [
+                (AIR, rectangle(x - width, x + width, *levels[1:3])),
+                (AIR, rectangle(x - bore, x + bore, *levels[:2])),
+            ]
+        x, last = self._middles()[0], self._middles()[-1]
+        marks: list[Mark] = [
+            Distance("chamber_width", (x - width, levels[3]), (x + width, levels[3]), 1),
+            Distance("inlet_diameter", (x - bore, 0), (x + bore, 0), -1),
+            Distance("border", (-half, 0), (x - width, 0), -2),
+            *(
+                Distance(name, (-half, levels[n]), (-half, levels[n + 1]), 1)
+                for n, name in enumerate(("base", "zone", "membrane"))
+            ),
+        ]
+        if self.segments > 1:
+            marks.append(Distance("spacing", (x + width, levels[3]), (self._middles()[1] - width, levels[3]), 2))
+        section = View(
+            "section y = 0 across the chambers",
+            areas,
+            [Pointer("segments", (last, levels[3]), 90)],
+            notes={"mount": (0, -0.1 * levels[3])},
+        )
+        right = half if self.segments == 1 else self._middles()[1] + width + 0.5 * self.spacing
+        detail = View("the first chamber, larger", areas, marks, window=(-half, right, 0, levels[3]))
+        above = [("body", rectangle(-half, half, -side, side))]
+        for x in self._middles():
+            above += [("base", rectangle(x - width, x + width, -length, length)), (AIR, circle(bore, centre=(x, 0.0)))]
+        marks = [
+            Distance("chamber_length", (half, -length), (half, length), -1),
+            Distance("border", (half, length), (half, side), -1),
+        ]
+        return [section, detail, View("seen from above, without the membrane", above, marks)]
 
     def draw(self) -> Shape:
         """Draw three layers, the middle one less the chambers and the base less the inlets."""

@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, rectangle
 from turgor.geometry.section import CUTS
 
 _STUDY = "Esmalipour and Ajri, PneuNet geometry study, Table 1"
@@ -80,6 +81,55 @@ class PneuNet(Actuator):
 
     def _refuse(self, key: str, problem: str, limit: float) -> None:
         raise InputError(problem, key=key, value=f"{getattr(self, key):g} mm", expected=f"less than {limit:g} mm")
+
+    def views(self) -> list[View]:
+        """Show the section along the finger, the walls around the first gap, and the section across a chamber."""
+        top, length = self._floor + self.chamber_height + self.top_wall, self.length
+        starts = list(self._chamber_starts())
+        solid = [("body", np.array(self._profile())), ("base", rectangle(0, length, 0, self.second_layer))]
+        inside = [rectangle(x, x + self.chamber_length, self._floor, self._floor + self.chamber_height) for x in starts]
+        passage = rectangle(starts[0], starts[-1] + self.chamber_length, self._floor, self._floor + self.tunnel_height)
+        areas = [*solid[: 2 if self.second_layer else 1], *((AIR, part) for part in (*inside, passage))]
+        first = (starts[0], starts[0] + self.chamber_length)
+        marks: list[Mark] = [
+            Distance("chamber_length", (first[0], top), (first[1], top), 1),
+            Distance("end_wall", (0, 0), (self.end_wall, 0), -1),
+        ]
+        if self.chambers > 1:
+            gap = first[1] + self.wall
+            roof = self._floor + self.tunnel_height
+            marks += [
+                Distance("wall", (first[1], top), (gap, top), 2),
+                Distance("gap", (gap, top), (gap + self.gap, top), 3),
+                Distance("tunnel_roof", (gap, roof), (gap, roof + self.tunnel_roof)),
+                Distance("tunnel_height", (gap + self.gap, self._floor), (gap + self.gap, roof), -4),
+            ]
+        end = min(length, starts[-1] if self.chambers < 3 else starts[1] + self.chamber_length + self.wall)
+        whole = View(
+            "section along the middle plane y = 0, from mount to tip",
+            areas,
+            [Pointer("chambers", (starts[-1] + 0.5 * self.chamber_length, top), 90)],
+            notes={"mount": (-0.03 * length, 0.5 * top), "tip": (1.02 * length, 0.0)},
+        )
+        detail = View("the first chambers, larger", areas, marks, window=(0.0, end, 0.0, top))
+        return [whole, detail, self._across(top)]
+
+    def _across(self, top: float) -> View:
+        half, side, low = 0.5 * self.chamber_width, 0.5 * self.chamber_width + self.side_wall, self.second_layer
+        areas = [("body", rectangle(-side, side, low, top)), ("base", rectangle(-side, side, 0.0, low))]
+        roof, ceiling, width = self._floor + self.tunnel_height, top - self.top_wall, 0.5 * self.tunnel_width
+        marks = [
+            Distance("chamber_width", (-half, top), (half, top), 2),
+            Distance("side_wall", (half, top), (side, top), 1),
+            Distance("chamber_height", (-side, self._floor), (-side, ceiling), 1),
+            Distance("top_wall", (side, ceiling), (side, top), -1),
+            Distance("first_layer", (side, low), (side, self._floor), -1),
+            Distance("tunnel_width", (-width, roof), (width, roof), 1),
+            *([Distance("second_layer", (-side, 0.0), (-side, low), 1)] if low else []),
+        ]
+        passage = rectangle(-width, width, self._floor, roof)
+        areas = [*areas[: 2 if low else 1], (AIR, rectangle(-half, half, self._floor, ceiling)), (AIR, passage)]
+        return View("section across a chamber; the passage behind it", areas, marks)
 
     def draw(self) -> Shape:
         """Draw the comb-shaped body less the air, on top of the base layer."""

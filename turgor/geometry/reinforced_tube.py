@@ -10,7 +10,8 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
-from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, circle, rectangle, ring_sector
 from turgor.geometry.section import CUTS, TURN
 
 _PAPER = "Quasi-static FEA model for a multi-material soft pneumatic actuator in SOFA, section III"
@@ -70,6 +71,62 @@ class ReinforcedTube(Actuator):
             raise InputError(
                 problem, key="rings", value=self.rings, expected="fewer or narrower rings, or less spacing"
             )
+
+    def views(self) -> list[View]:
+        """Show the section along the axis, the side with the band, and the section between two rings."""
+        inner, outer, length = 0.5 * self.inner_diameter, 0.5 * self.outer_diameter, self.length
+        margin, low = 0.5 * (length - self.cavity_length), 0.5 * (length - self.reinforced_length)
+        pitch, reach = self.ring_width + self.ring_spacing, outer + self.thickness
+        rings = [
+            ("reinforcement", rectangle(z, z + self.ring_width, -reach, reach))
+            for z in (low + number * pitch for number in range(self.rings))
+        ]
+        tube, air = rectangle(0, length, -outer, outer), rectangle(margin, length - margin, -inner, inner)
+        band = rectangle(low, length - low, outer, reach)
+        section = View(
+            "section y = 0 along the axis; the band is on top",
+            [*rings, ("body", tube), (AIR, air), ("reinforcement", band)],
+            [
+                Distance("length", (0, -outer), (length, -outer), -5),
+                Distance("cavity_length", (margin, -outer), (length - margin, -outer), -4),
+                Distance("inner_diameter", (0.3 * length, -inner), (0.3 * length, inner)),
+                Distance("outer_diameter", (length, -outer), (length, outer), -1),
+                Pointer("rings", (low + (self.rings - 1) * pitch + 0.5 * self.ring_width, -reach), -90, 1.5),
+            ],
+            notes={"mount": (-0.03 * length, 0.0), "cavity": (0.5 * length, 0.0)},
+        )
+        return [section, self._side_view(tube, rings, low), self._ring_view()]
+
+    def _side_view(self, tube: FloatArray, rings: list[tuple[str, FloatArray]], low: float) -> View:
+        inner, reach = 0.5 * self.outer_diameter, 0.5 * self.outer_diameter + self.thickness
+        half_angle = 0.5 * self.band_width / inner
+        half, first, pitch = reach * math.sin(half_angle), low + self.ring_width, self.ring_width + self.ring_spacing
+        marks: list[Mark] = [
+            Distance("ring_width", (low, reach), (first, reach), 1),
+            Distance("ring_spacing", (first, reach), (low + pitch, reach), 2),
+        ]
+        areas = [("body", tube), *rings, ("reinforcement", rectangle(low, self.length - low, -half, half))]
+        end = low + min(self.rings, 5) * pitch
+        return View(
+            "seen from the side of the band, the end at the mount", areas, marks, window=(0, end, -reach, reach)
+        )
+
+    def _ring_view(self) -> View:
+        inner, outer = 0.5 * self.inner_diameter, 0.5 * self.outer_diameter
+        reach, half_angle = outer + self.thickness, 0.5 * self.band_width / outer
+        band = ring_sector(outer, reach, math.pi - half_angle, math.pi + half_angle)
+        foot = circle(outer, math.pi - half_angle, math.pi - half_angle)[0]
+        areas = [("body", circle(outer)), (AIR, circle(inner)), ("reinforcement", band)]
+        marks: list[Mark] = [
+            Distance("thickness", (-reach, 0), (-outer, 0)),
+            Pointer("band_width", (float(foot[0]), float(foot[1])), 150, 2),
+        ]
+        return View(
+            "section between two rings; the band's width is measured along the tube's outside",
+            areas,
+            marks,
+            [circle(outer, math.pi - half_angle, math.pi + half_angle)],
+        )
 
     def draw(self) -> Shape:
         """Draw the tube, the rings and the band around it, and make their interface common."""

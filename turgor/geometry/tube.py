@@ -10,6 +10,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.drawing import AIR, Distance, View, circle, rectangle
 from turgor.geometry.path import polygon
 from turgor.geometry.section import CUTS, TURN, PlaneSection
 
@@ -55,6 +56,29 @@ class CappedTube(Actuator):
                 value=f"{self.cap:g} mm",
                 expected=f"less than half of the length, {self.length / 2:g} mm",
             )
+
+    def views(self) -> list[View]:
+        """Show the section along the axis and the one across it."""
+        inner, outer, length = self.inner_radius, self.inner_radius + self.wall, self.length
+        along = View(
+            "section along the axis",
+            [
+                ("body", rectangle(0, length, -outer, outer)),
+                (AIR, rectangle(self.cap, length - self.cap, -inner, inner)),
+            ],
+            [
+                Distance("length", (0, -outer), (length, -outer), -3),
+                Distance("cap", (0, -outer), (self.cap, -outer), -1),
+            ],
+            lines=[np.array([[-0.03 * length, 0.0], [1.03 * length, 0.0]])],
+            notes={"cavity": (0.5 * length, 0.5 * inner), "mount": (-0.03 * length, 0.5 * outer)},
+        )
+        across = View(
+            "section across the axis",
+            [("body", circle(outer)), (AIR, circle(inner))],
+            [Distance("inner_radius", (0, 0), (inner, 0)), Distance("wall", (0, inner), (0, outer))],
+        )
+        return [along, across]
 
     def draw(self) -> Shape:
         """Draw the section, or the outer cylinder less the inner one."""

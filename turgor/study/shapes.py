@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from turgor.common.units import to_internal
 from turgor.geometry import bellows, fibre_tube, honeycomb, membrane, pneunet, reinforced_tube, tube
 from turgor.geometry.actuator import Actuator
+from turgor.geometry.catalogue import actuator
 from turgor.geometry.imported import step
 from turgor.mesh import Mesh
 from turgor.mesh.generate import generate
+from turgor.mesh.preview import save_preview
+from turgor.study.reading import override
 
 
 class _Meshed(Actuator):
@@ -37,6 +42,29 @@ class _Meshed(Actuator):
         local = {name: to_internal(text, "length", key=f"sizes.{name}") for name, text in (sizes or {}).items()}
         whole = None if size is None else to_internal(size, "length", key="size")
         return generate(self, whole, sizes=local, per_circle=per_circle)
+
+
+def preview(name: str, path: str | Path, changes: Sequence[str] = ()) -> None:
+    """Save a picture of a template: its drawing with every dimension, and its mesh.
+
+    Parameters
+    ----------
+    name
+        Of the template.
+    path
+        Ends in .png.
+    changes
+        Assignments ``parameter=value``, as ``wall=2 mm``.
+
+    Raises
+    ------
+    InputError
+        If there is no such template, a parameter is wrong or the path cannot hold a PNG file.
+    """
+    parameters: dict[str, Any] = {}
+    for change in changes:
+        override(parameters, change)
+    save_preview(actuator(name, **parameters), path)
 
 
 class Bellows(bellows.Bellows, _Meshed):

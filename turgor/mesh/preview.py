@@ -1,0 +1,43 @@
+"""A template at a glance: its dimensioned drawing, and below it the mesh in space."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.image
+
+from turgor.common.errors import InputError
+from turgor.geometry.actuator import Actuator
+from turgor.mesh.drawing import save_drawing
+from turgor.mesh.generate import generate
+from turgor.mesh.picture import save_picture
+
+
+def save_preview(actuator: Actuator, path: str | Path) -> None:
+    """Draw an actuator with its dimensions, mesh it (cut open), and save both as one PNG file; no screen is needed.
+
+    Of a plane shape only the drawing is there.
+
+    Raises
+    ------
+    InputError
+        If the path does not end in .png or its folder does not exist, the shape has no drawing or gmsh no valid mesh.
+    MissingPackageError
+        If gmsh, pyvista or a system library that they load is absent.
+    """
+    path = Path(path)
+    if path.suffix != ".png":
+        raise InputError("a picture is saved as .png", value=str(path))
+    if not path.parent.is_dir():
+        raise InputError("there is no such folder", value=str(path.parent))
+    picture = None
+    if actuator.section is None:
+        mesh = generate(actuator)
+        # A whole body hides its cavities, unless it is drawn translucent for its fibres.
+        is_whole = not mesh.curves and not any(name.startswith("symmetry") for name in mesh.surfaces)
+        with tempfile.TemporaryDirectory() as folder:
+            image = Path(folder) / "mesh.png"
+            save_picture(mesh, image, cut=is_whole, window=(1430, 800))
+            picture = matplotlib.image.imread(image)
+    save_drawing(actuator, path, picture)
