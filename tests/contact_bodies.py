@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipctk
 import numpy as np
+from scipy.optimize import brentq
 
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
@@ -25,7 +26,7 @@ def merged(**parts: Mesh) -> Mesh:
 
 
 def shifted_mesh(mesh: Mesh, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Mesh:
-    return Mesh(mesh.points + np.array([x, y, z]), mesh.cells, surfaces=mesh.surfaces)
+    return Mesh(mesh.points + np.array([x, y, z])[: mesh.dimension], mesh.cells, surfaces=mesh.surfaces)
 
 
 def graded(mesh: Mesh, axis: int, divisions: int, places: np.ndarray) -> Mesh:
@@ -33,6 +34,12 @@ def graded(mesh: Mesh, axis: int, divisions: int, places: np.ndarray) -> Mesh:
     points = mesh.points.copy()
     points[:, axis] = np.interp(points[:, axis] * divisions, np.arange(divisions + 1), places)
     return Mesh(points, mesh.cells, surfaces=mesh.surfaces)
+
+
+def geometric(first: float, n: int, length: float) -> np.ndarray:
+    """Places of n + 1 grid planes whose distances grow by a constant factor from `first` on and fill `length`."""
+    factor = brentq(lambda q: first * np.sum(q ** np.arange(n)) - length, 1.0, 10.0)
+    return np.concatenate([[0.0], np.cumsum(first * factor ** np.arange(n))])
 
 
 def half_chamber(lengths: tuple[float, float, float], divisions: tuple[int, int, int]) -> Mesh:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_bodies import graded, half_chamber, merged, overlaps_by_more_than, shifted_mesh
+from contact_bodies import geometric, graded, half_chamber, merged, overlaps_by_more_than, shifted_mesh
 from samples import neo_hookean
-from scipy.optimize import brentq
 
 from turgor.fem.contact.skin import STIFFNESS
 from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
@@ -17,12 +16,6 @@ from turgor.fem.supports import Clamped, Prescribed, Sliding
 from turgor.fem.system import System
 from turgor.mesh.structured import box
 from turgor.solver.path import output_fractions, solve_path
-
-
-def geometric(first: float, n: int, length: float) -> np.ndarray:
-    """Places of n + 1 grid planes whose distances grow by a constant factor from `first` on and fill `length`."""
-    factor = brentq(lambda q: first * np.sum(q ** np.arange(n)) - length, 1.0, 10.0)
-    return np.concatenate([[0.0], np.cumsum(first * factor ** np.arange(n))])
 
 
 def test_hertz_cylinder_on_a_half_space():

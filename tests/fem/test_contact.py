@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from contact_bodies import half_chamber, merged, shifted_mesh
-from samples import differences, neo_hookean, random_state, shifted
+from contact_checks import check_contact, check_obstacle
+from samples import neo_hookean, random_state, shifted
 
 from turgor.common.errors import InputError
-from turgor.fem.contact.pairs import find_partners
+from turgor.fem.contact.pairs import balls, find_partners
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
-from turgor.fem.frames import block_products
 from turgor.fem.rigid import Box, Cylinder, Plane, Sphere
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
@@ -35,28 +35,6 @@ def stacked(gap: float) -> System:
     return System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("low-z0"), Clamped("high-z1")], contact=contact)
 
 
-def force_of(term, state):
-    out = np.zeros_like(state.u)
-    term.force(state, out)
-    return out
-
-
-def check_contact(term, state):
-    """Compare force and stiffness with differences, as for other terms; the blocks are those of this state."""
-    direction = np.random.default_rng(7).standard_normal(state.u.shape)
-    slope = np.vdot(force_of(term, state), direction)
-    assert term.touch(state).overlap > 1e-3
-    assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-6)
-    nodes, packed = term.blocks(state, term.lagged_at(state.u, state.loads))
-    assert len(nodes) > 3
-    product = np.zeros_like(state.u)
-    block_products(nodes, packed, direction, product)
-    step = 1e-6
-    more, less = (force_of(term, shifted(state, direction, h)) for h in (step, -step))
-    expected = (more - less) / (2 * step)
-    np.testing.assert_allclose(product, expected, atol=1e-6 * np.abs(expected).max())
-
-
 def test_self_contact():
     system = stacked(-0.05)
     check_contact(system.contacts[0], random_state(system, 0.008))
@@ -68,16 +46,7 @@ def test_rigid_body(name):
     mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
     system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=[case])
     state = random_state(system, 0.008)
-    term = system.contacts[0]
-    check_contact(term, state)
-    # the force on the body is minus the derivative by its place, its derivative by the motion's factor likewise
-    more, less = (state.with_loads(state.loads + h) for h in (1e-5, -1e-5))
-    assert term.conjugate(state) == pytest.approx(-(term.energy(more) - term.energy(less)) / 2e-5, rel=1e-6)
-    assert np.dot(term.touch(state).force, case.motion) == pytest.approx(term.conjugate(state), rel=1e-12)
-    gradient = np.zeros_like(state.u)
-    term.load_gradient(state, gradient)
-    expected = (force_of(term, more) - force_of(term, less)) / 2e-5
-    np.testing.assert_allclose(gradient, expected, atol=1e-6 * np.abs(expected).max())
+    check_obstacle(system.contacts[0], state, case.motion)
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -156,7 +125,8 @@ def test_closest_points_are_closest():
     start, candidates = np.array([0, 0, 1]), np.array([0], np.int32)
     shape_of = (2, len(skin.rule))
     partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
-    find_partners(points, faces, skin.rule, start, candidates, np.ones(2), 1.0, partner, at, gap)
+    centre, _, radius = balls(points, faces)
+    find_partners(points, faces, centre, radius, skin.rule, start, candidates, np.ones(2), 1.0, partner, at, gap)
     assert (partner[1] == 0).all()
     slaves = skin.shape @ points[faces[1]]
     nearest = np.linalg.norm(slaves[:, None] - surface[None], axis=2).min(axis=1)

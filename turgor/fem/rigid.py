@@ -1,9 +1,14 @@
-"""Rigid bodies that an actuator may touch: their signed distance and its derivatives."""
+"""Rigid bodies that an actuator may touch: their signed distance and its derivatives.
+
+Places have d coordinates, three in space and two in the plane of a plane model. There a plane is a line, a sphere
+a circle, a box a rectangle, and a cylinder a rectangle around its axis; what they look like across the plane follows
+from the model (in a body of revolution, a circle on the axis is a sphere and one off it a ring).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +16,7 @@ from numpy.typing import NDArray
 from turgor.common.errors import InputError
 
 Floats = NDArray[np.float64]
-Vector = tuple[float, float, float]
+Vector = tuple[float, ...]
 
 
 class RigidBody(Protocol):
@@ -19,20 +24,20 @@ class RigidBody(Protocol):
 
     @property
     def reference_point(self) -> Floats:
-        """The point ``(3,)`` that torque is taken about, mm."""
+        """The point ``(d,)`` that torque is taken about, mm."""
         ...
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the signed distance of points ``(n, 3)`` and its derivatives.
+        """Return the signed distance of points ``(n, d)`` and its derivatives.
 
         Returns
         -------
         distance
             ``(n,)``, mm: negative inside; outside it may be less than the true one where an edge is nearest.
         normal
-            Its gradient ``(n, 3)``, of unit length.
+            Its gradient ``(n, d)``, of unit length.
         curvature
-            Its second derivative ``(n, 3, 3)``, 1/mm.
+            Its second derivative ``(n, d, d)``, 1/mm.
         """
         ...
 
@@ -56,7 +61,12 @@ class Plane:
         """Return the height over the plane; see :meth:`RigidBody.distance`."""
         normal = _unit(self.normal)
         height = (x - self.point) @ normal
-        return height, np.broadcast_to(normal, x.shape), np.zeros((len(x), 3, 3))
+        return height, np.broadcast_to(normal, x.shape), np.zeros((*x.shape, x.shape[1]))
+
+    def section(self) -> Self:
+        """Return the line; see :data:`Sectioned`."""
+        _check_plane(self.normal, "normal")
+        return replace(self, point=self.point[:2], normal=self.normal[:2])
 
 
 @dataclass(frozen=True)
@@ -77,7 +87,12 @@ class Sphere:
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the distance from the surface; see :meth:`RigidBody.distance`."""
         reach, normal = _direction(x - self.centre)
-        return reach - self.radius, normal, _round(reach, normal, np.eye(3))
+        return reach - self.radius, normal, _round(reach, normal, np.eye(x.shape[1]))
+
+    def section(self) -> Self:
+        """Return the circle; see :data:`Sectioned`."""
+        _check_plane(self.centre, "centre")
+        return replace(self, centre=self.centre[:2])
 
 
 @dataclass(frozen=True)
@@ -90,7 +105,7 @@ class Cylinder:
 
     def __post_init__(self) -> None:
         _check_length(self.radius, "radius")
-        _check_direction((self.end[0] - self.start[0], self.end[1] - self.start[1], self.end[2] - self.start[2]), "end")
+        _check_direction(tuple(np.subtract(self.end, self.start)), "end")
 
     @property
     def reference_point(self) -> Floats:
@@ -102,7 +117,7 @@ class Cylinder:
         span = np.subtract(self.end, self.start)
         length = float(np.linalg.norm(span))
         axis = span / length
-        across = np.eye(3) - np.outer(axis, axis)
+        across = np.eye(x.shape[1]) - np.outer(axis, axis)
         away = x - self.reference_point
         along = away @ axis
         reach, normal = _direction(away @ across)
@@ -112,6 +127,14 @@ class Cylinder:
         normal = np.where(at_end[:, None], np.where(along > 0.0, 1.0, -1.0)[:, None] * axis, normal)
         curvature[at_end] = 0.0
         return np.maximum(end, reach - self.radius), normal, curvature
+
+    def section(self) -> Cylinder | Sphere:
+        """Return the circle of a cylinder across the plane, the rectangle of one in it; see :data:`Sectioned`."""
+        if len(self.start) > 2 and self.start[:2] == self.end[:2] and self.start[2] * self.end[2] < 0.0:
+            return Sphere(self.start[:2], self.radius)
+        _check_plane(self.start, "start")
+        _check_plane(self.end, "end")
+        return replace(self, start=self.start[:2], end=self.end[:2])
 
 
 @dataclass(frozen=True)
@@ -138,11 +161,25 @@ class Box:
         row = np.arange(len(x))
         normal = np.zeros_like(x)
         normal[row, axis] = np.where(away[row, axis] > 0.0, 1.0, -1.0)
-        return heights[row, axis], normal, np.zeros((len(x), 3, 3))
+        return heights[row, axis], normal, np.zeros((*x.shape, x.shape[1]))
+
+    def section(self) -> Self:
+        """Return the rectangle; see :data:`Sectioned`."""
+        if len(self.lower) > 2 and not self.lower[2] < 0.0 < self.upper[2]:
+            raise InputError("the box does not reach across the plane z = 0", key="lower", value=self.lower)
+        return replace(self, lower=self.lower[:2], upper=self.upper[:2])
+
+
+Sectioned = Plane | Sphere | Cylinder | Box
+"""Bodies that a plane model may meet too.
+
+Their method ``section`` returns what the plane z = 0 cuts out of them, in two coordinates (themselves if they have only
+two), and raises InputError if they do not look the same in front of and behind that plane.
+"""
 
 
 def _direction(away: Floats) -> tuple[Floats, Floats]:
-    """Return lengths ``(n,)`` and unit vectors ``(n, 3)``; of a vector without length, any."""
+    """Return lengths ``(n,)`` and unit vectors ``(n, d)``; of a vector without length, any."""
     reach = np.linalg.norm(away, axis=1)
     return reach, away / np.where(reach > 0.0, reach, 1.0)[:, None]
 
@@ -160,6 +197,11 @@ def _unit(vector: Vector) -> Floats:
 def _check_direction(vector: Vector, key: str) -> None:
     if not np.linalg.norm(vector) > 0.0:
         raise InputError("this direction has no length", key=key, value=vector)
+
+
+def _check_plane(vector: Vector, key: str) -> None:
+    if any(vector[2:]):
+        raise InputError("this does not lie in the plane z = 0 of the model", key=key, value=vector)
 
 
 def _check_length(length: float, key: str) -> None:

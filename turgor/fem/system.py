@@ -269,7 +269,7 @@ class System:
     def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase) -> Contact:
         pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
         channel = self.loads.index(case) if isinstance(case, RigidContact) and case.motion is not None else None
-        return make_contact(self.mesh, materials, case, pressure, channel)
+        return make_contact(self.mesh, materials, case, pressure, channel, self.section)
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)

@@ -220,7 +220,11 @@ def _controlled(
     compliance = -float(np.vdot(measured, response))
     value, by_conjugate, by_fraction = control.gap(system.conjugate(state, control.weights), fraction)
     value -= by_conjugate * float(np.vdot(measured, du))
-    change = -value / (by_conjugate * compliance + by_fraction)
+    slope = by_conjugate * compliance + by_fraction
+    if slope == 0.0:
+        # Nothing is loaded yet: a rigid body that moves has not met anything.
+        raise NotConvergedError("there is no load that the control could follow")
+    change = -value / slope
     return du + change * response, change, compliance
 
 

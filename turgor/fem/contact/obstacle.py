@@ -30,11 +30,13 @@ class Obstacle:
     body
         Its shape and place.
     motion
-        Its displacement at factor one, ``(3,)``, mm.
+        Its displacement at factor one, ``(d,)``, mm.
     channel
         Place of the factor in ``State.loads``; ``None``: the body stands still.
     name
         Of the contact.
+    turned
+        Whether the model is a body of revolution, around whose axis y all forces across it cancel.
 
     Attributes
     ----------
@@ -44,13 +46,16 @@ class Obstacle:
 
     nodes = NO_NODES
 
-    def __init__(self, skin: Skin, body: RigidBody, motion: Floats, channel: int | None, name: str) -> None:
+    def __init__(
+        self, skin: Skin, body: RigidBody, motion: Floats, channel: int | None, name: str, turned: bool = False
+    ) -> None:
         self.skin = skin
         self.body = body
         self.motion = motion
         self.moves = channel is not None
         self.channel = -1 if channel is None else channel
         self.name = name
+        self._turned = turned
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
@@ -72,7 +77,7 @@ class Obstacle:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
 
     def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
-        """Return the six nodes of each face that overlaps the body and the packed stiffnesses."""
+        """Return the nodes of each face that overlaps the body and the packed stiffnesses."""
         gap, normal, curvature = self._gaps(state.u, state.loads)
         touching = np.flatnonzero((gap < 0.0).any(axis=1))
         stiffness = self._normal_stiffness(state)[touching] * (gap[touching] < 0.0)
@@ -80,8 +85,10 @@ class Obstacle:
         n, N = normal[touching], self.skin.shape
         at_points = stiffness[:, :, None, None] * n[:, :, :, None] * n[:, :, None, :]
         at_points += force[:, :, None, None] * curvature[touching]
-        full = np.einsum("qa,qb,fqij->faibj", N, N, at_points, optimize=True).reshape(len(touching), 18, 18)
-        packed = np.empty((len(touching), packed_size(18)))
+        full = np.einsum("qa,qb,fqij->faibj", N, N, at_points, optimize=True)
+        rows = full.shape[1] * full.shape[2]
+        full = full.reshape(len(touching), rows, rows)
+        packed = np.empty((len(touching), packed_size(rows)))
         pack_symmetric(full, packed)
         return self.skin.faces[touching], packed
 
@@ -130,38 +137,51 @@ class Obstacle:
     def touch(self, state: State) -> Touch:
         """Return area, overlaps, and force and torque on the body."""
         gap, _, _ = self._gaps(state.u, state.loads)
-        push = self._pushes(state).reshape(-1, 3)
-        place = self.body.reference_point + self._shift(state.loads)
-        arm = (self.skin.points + state.u)[self.skin.faces]
-        torque = np.cross(np.einsum("qa,fai->fqi", self.skin.shape, arm).reshape(-1, 3) - place, push).sum(axis=0)
-        force = push.sum(axis=0)
+        force, torque = self._resultants(state)
         overlap = np.maximum(-gap, 0.0)
         return Touch(
             self.name,
             area=float(self.skin.area[gap < 0.0].sum()),
             overlap=float(overlap.max()),
             overlap_per_wall=float((overlap / self.skin.wall[:, None]).max()),
-            force=(float(force[0]), float(force[1]), float(force[2])),
-            torque=(float(torque[0]), float(torque[1]), float(torque[2])),
+            force=force,
+            torque=torque,
+        )
+
+    def _resultants(self, state: State) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return force and torque on the body, of three components also in a plane model."""
+        push = self._pushes(state)
+        arm = self._places(state.u) - (self.body.reference_point + self._shift(state.loads))
+        push, arm = (np.pad(v.reshape(-1, v.shape[2]), ((0, 0), (0, 3 - v.shape[2]))) for v in (push, arm))
+        force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
+        if self._turned:
+            force[0] = torque[2] = 0.0
+        return (float(force[0]), float(force[1]), float(force[2])), (
+            float(torque[0]),
+            float(torque[1]),
+            float(torque[2]),
         )
 
     def _shift(self, loads: Floats) -> Floats:
         return self.motion * (loads[self.channel] if self.moves else 0.0)
 
+    def _places(self, u: Floats) -> Floats:
+        return self._at_points(self.skin.points[:, : self.skin.dimension] + u)
+
     def _at_points(self, field: Floats) -> Floats:
         return np.asarray(np.einsum("qa,fai->fqi", self.skin.shape, field[self.skin.faces]))
 
     def _gaps(self, u: Floats, loads: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return distance ``(k, q)``, normal ``(k, q, 3)`` and curvature ``(k, q, 3, 3)`` at the quadrature points."""
-        shape = self.skin.area.shape
-        x = self._at_points(self.skin.points + u).reshape(-1, 3)
-        gap, normal, curvature = self.body.distance(x - self._shift(loads))
-        return gap.reshape(shape), normal.reshape(*shape, 3), curvature.reshape(*shape, 3, 3)
+        """Return distance ``(k, q)``, normal ``(k, q, d)`` and curvature ``(k, q, d, d)`` at the quadrature points."""
+        x = self._places(u) - self._shift(loads)
+        d = x.shape[2]
+        gap, normal, curvature = self.body.distance(x.reshape(-1, d))
+        return gap.reshape(x.shape[:2]), normal.reshape(x.shape), curvature.reshape(*x.shape, d)
 
     def _normal_stiffness(self, state: State) -> Floats:
         return np.asarray(state.penalty * STIFFNESS * (self.skin.load / self.skin.grip)[:, None] * self.skin.area)
 
     def _pushes(self, state: State) -> Floats:
-        """Return what each point pushes the body with, ``(k, q, 3)``, N."""
+        """Return what each point pushes the body with, ``(k, q, d)``, N."""
         gap, normal, _ = self._gaps(state.u, state.loads)
         return np.asarray((self._normal_stiffness(state) * np.minimum(gap, 0.0))[:, :, None] * normal)

@@ -13,7 +13,8 @@ from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.surfaces import SurfaceContact
 from turgor.fem.contact.term import Contact
-from turgor.fem.rigid import RigidBody, Vector
+from turgor.fem.rigid import RigidBody, Sectioned, Vector
+from turgor.fem.section import Axisymmetric, Section, in_section, on_axis
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
@@ -76,7 +77,12 @@ ContactCase = SelfContact | PairContact | RigidContact
 
 
 def make_contact(
-    mesh: Mesh, materials: Mapping[str, Hyperelastic], case: ContactCase, pressure: float, channel: int | None
+    mesh: Mesh,
+    materials: Mapping[str, Hyperelastic],
+    case: ContactCase,
+    pressure: float,
+    channel: int | None,
+    section: Section | None = None,
 ) -> Contact:
     """Return the term of a contact.
 
@@ -90,20 +96,51 @@ def make_contact(
         The largest air pressure, MPa: it sets the scale of the contact stiffness.
     channel
         Place of the motion's factor in ``State.loads``, for a rigid body that moves.
+    section
+        What a plane mesh stands for.
 
     Raises
     ------
     InputError
-        If the mesh has no such surface, or is not of tetrahedra.
+        If the mesh has no such surface, its faces are quadrilaterals, or a rigid body does not fit the section.
     """
-    if mesh.cell_type != "tet10":
-        raise InputError("contact works on meshes of tetrahedra only", key="contact", value=mesh.cell_type)
+    if mesh.cell_type == "hex27":
+        raise InputError("contact works on meshes of tetrahedra or plane cells", key="contact", value=mesh.cell_type)
     if isinstance(case, RigidContact):
-        faces = boundary_faces(mesh.cells) if case.surface is None else mesh.surface(case.surface)
-        motion = np.array(case.motion or (0.0, 0.0, 0.0))
-        return Obstacle(Skin(mesh, faces, materials, pressure), case.body, motion, channel, case.name)
+        faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
+        body, motion = _fitting(case, mesh, section)
+        turned = isinstance(section, Axisymmetric)
+        return Obstacle(Skin(mesh, faces, materials, pressure, section), body, motion, channel, case.name, turned)
     if isinstance(case, PairContact):
         first, second = mesh.surface(case.first), mesh.surface(case.second)
         group = np.repeat(np.array([0, 1], np.int32), [len(first), len(second)])
-        return SurfaceContact(Skin(mesh, np.vstack([first, second]), materials, pressure), group, case.name)
-    return SurfaceContact(Skin(mesh, boundary_faces(mesh.cells), materials, pressure), None, case.name)
+        skin = Skin(mesh, np.vstack([first, second]), materials, pressure, section)
+        return SurfaceContact(skin, group, case.name)
+    return SurfaceContact(Skin(mesh, _whole(mesh, section), materials, pressure, section), None, case.name)
+
+
+def _whole(mesh: Mesh, section: Section | None) -> Ints:
+    """Return all faces of the skin; what lies on the axis of revolution is none."""
+    faces = boundary_faces(mesh.cells)
+    return faces[~np.isin(faces, on_axis(mesh, section)).all(axis=1)]
+
+
+def _fitting(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[RigidBody, Floats]:
+    """Return body and motion as the model sees them; raise InputError if they do not fit it."""
+    key = f"contact.{case.name}"
+    motion = np.zeros(mesh.dimension)
+    if case.motion is not None:
+        motion = in_section(case.motion, mesh, section, f"{key}.motion", total=True)
+    body = case.body
+    if section is not None:
+        if not isinstance(body, Sectioned):
+            raise InputError("this body has no place in a plane model", key=key, value=type(body).__name__)
+        body = body.section()
+    if len(body.reference_point) != mesh.dimension:
+        raise InputError(
+            "the body does not fit the model",
+            key=key,
+            value=f"{len(body.reference_point)} coordinates",
+            expected=f"{mesh.dimension} coordinates",
+        )
+    return body, motion

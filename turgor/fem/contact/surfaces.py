@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.contact.pairs import NOWHERE, find_partners, gap_gradients, pair_stiffness
+from turgor.fem.contact.pairs import NOWHERE, balls, find_partners, gap_gradients, pair_stiffness
+from turgor.fem.contact.search import Search
 from turgor.fem.contact.skin import STIFFNESS, Skin
 from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
 from turgor.fem.pattern import packed_size
@@ -20,6 +21,9 @@ Indices = NDArray[np.intp]
 
 REACH = 3.0
 """Before a step, pairs are watched whose gap is up to so many face sizes."""
+
+KEPT = 3
+"""So many answers are kept: a step asks about its beginning, its end and what lies between in turn."""
 
 SOON = 0.5
 """Faces whose gap is below so many face sizes are given room in the matrix."""
@@ -67,8 +71,8 @@ class SurfaceContact:
     def __init__(self, skin: Skin, group: Ints | None, name: str) -> None:
         self.skin = skin
         self.name = name
-        self._group = group
-        self._found: tuple[Floats, Pairs] | None = None
+        self._search = Search(skin, group)
+        self._found: list[tuple[Floats, Pairs]] = []
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
@@ -90,28 +94,28 @@ class SurfaceContact:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
 
     def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
-        """Return the twelve nodes of each pair that overlaps and the packed stiffnesses."""
-        pairs = self._touching(state.u)
+        """Return the nodes of each pair that overlaps and the packed stiffnesses."""
+        skin, pairs = self.skin, self._touching(state.u)
         nodes = self._nodes(pairs)
-        packed = np.empty((len(nodes), packed_size(36)))
+        packed = np.empty((len(nodes), packed_size(nodes.shape[1] * skin.dimension)))
         stiffness = self._normal_stiffness(state, pairs)
         force = stiffness * np.minimum(lagged[pairs.face, pairs.quad], 0.0)
-        x = self.skin.points + state.u
-        slaves, masters = self.skin.faces[pairs.face], self.skin.faces[pairs.masters]
-        pair_stiffness(x, slaves, masters, pairs.at, pairs.local, pairs.gap, stiffness, force, packed)
+        slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
+        x, d = skin.space(state.u), skin.dimension
+        pair_stiffness(x, slaves, masters, pairs.at, pairs.local, pairs.gap, stiffness, force, d, packed)
         return nodes, packed
 
     def couplings(self, u: Floats) -> Ints:
         """Return the nodes of all pairs of faces near each other, of which one meets something soon."""
-        skin, x = self.skin, self.skin.points + u
-        start, second = skin.candidates(x, SOON * skin.size, self._group)
-        pairs = self._pairs(x, start, second, SOON * skin.size)
+        skin, x = self.skin, self.skin.space(u)
+        start, second = self._search.candidates(x, SOON * skin.size)
+        pairs = self._pairs(x, SOON * skin.size)
         awake = np.zeros(len(skin.faces), bool)
         awake[pairs.face] = awake[pairs.masters] = True
         first = np.repeat(np.arange(len(skin.faces)), np.diff(start))
         keep = (awake[first] | awake[second]) & (first < second)
-        near = np.stack([first[keep], second[keep]], axis=1)
-        return np.concatenate([skin.faces[near].reshape(-1, 12), self._nodes(pairs)])
+        near = np.hstack([skin.faces[first[keep]], skin.faces[second[keep]]])
+        return np.concatenate([near, self._nodes(pairs)])
 
     def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the gap of every quadrature point that overlaps something, else zero, ``(k, q)``, mm."""
@@ -130,9 +134,9 @@ class SurfaceContact:
         First by the rates of the gaps, for all pairs in reach; then by looking, for pairs that were not in
         sight, or turned on the way.
         """
-        skin, x = self.skin, self.skin.points + state.u
-        reach = REACH * skin.size
-        pairs = self._pairs(x, *skin.candidates(x, reach, self._group), reach)
+        # A gap closes by no more than both sides move; between nodes a field may be larger than at them.
+        reach = min(REACH * self.skin.size, 4.0 * float(np.sqrt((du**2).sum(axis=1)).max()))
+        pairs = self._pairs(self.skin.space(state.u), reach)
         growth = GROWTH_OF_OVERLAP * self._depth(pairs)
         rate = self._rates(state.u, pairs, du)
         closing = rate < 0.0
@@ -161,18 +165,23 @@ class SurfaceContact:
         )
 
     def _touching(self, u: Floats) -> Pairs:
-        # All functions of one state ask in turn: the answer to the last question is kept, and nothing else.
-        if self._found is None or not np.array_equal(self._found[0], u):
-            x = self.skin.points + u
-            pairs = self._pairs(x, *self.skin.candidates(x, 0.0, self._group), 0.0)
-            self._found = (u.copy(), pairs.where(pairs.gap < 0.0))
-        return self._found[1]
+        for at, found in self._found:
+            if np.array_equal(at, u):
+                return found
+        pairs = self._pairs(self.skin.space(u), 0.0)
+        pairs = pairs.where(pairs.gap < 0.0)
+        self._found = [(u.copy(), pairs), *self._found[: KEPT - 1]]
+        return pairs
 
-    def _pairs(self, x: Floats, start: Indices, candidates: Ints, reach: float) -> Pairs:
+    def _pairs(self, x: Floats, reach: float) -> Pairs:
         skin = self.skin
         shape = skin.area.shape
         partner, local, gap = np.empty(shape, np.int32), np.empty((*shape, 2)), np.empty(shape)
-        find_partners(x, skin.faces, skin.rule, start, candidates, skin.depth, reach, partner, local, gap)
+        start, candidates = self._search.candidates(x, reach)
+        centre, _, radius = balls(x, skin.faces)
+        find_partners(
+            x, skin.faces, centre, radius, skin.rule, start, candidates, skin.depth, reach, partner, local, gap
+        )
         face, quad = np.nonzero(partner != NOWHERE)
         return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], gap[face, quad])
 
@@ -181,9 +190,9 @@ class SurfaceContact:
 
     def _gradients(self, u: Floats, pairs: Pairs) -> Floats:
         skin = self.skin
-        gradient = np.empty((len(pairs.gap), 12, 3))
+        gradient = np.empty((len(pairs.gap), 2 * skin.faces.shape[1], skin.dimension))
         slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
-        gap_gradients(skin.points + u, slaves, masters, pairs.at, pairs.local, gradient)
+        gap_gradients(skin.space(u), slaves, masters, pairs.at, pairs.local, gradient)
         return gradient
 
     def _rates(self, u: Floats, pairs: Pairs, du: Floats) -> Floats:
