@@ -78,6 +78,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "only-text.yaml": ("no keys", "a tube of rubber"),
     "outputs-beyond-the-load.yaml": ("solver.outputs", "from 0 to the load's"),
     "outputs-out-of-order.yaml": ("solver.outputs", "in order"),
+    "negative-friction.yaml": ("contact.friction", "-0.3", "greater than or equal to 0"),
     "pair-of-one.yaml": ("contact.pairs.0.1", "missing"),
     "plane-without-normal.yaml": ("contact.bodies.0.normal", "length 0"),
     "plane-section.yaml": ("geometry.model", "can be meshed but not run", "a model in space"),

@@ -186,6 +186,23 @@ def test_the_summary_tells_what_a_rigid_body_feels(small_tube: Path, tmp_path: P
     assert resumed.summary["contact"]["table"]["force_N"] == pytest.approx(touch["force_N"])
 
 
+RUBBING = TABLE.replace("}", ", move: [2 mm, 0 mm, 0 mm], friction: 0.3}")
+
+
+@pytest.mark.usefixtures("unreported")
+def test_friction_is_remembered_where_a_run_is_resumed(small_tube: Path, tmp_path: Path) -> None:
+    case = load_case(small_tube, [f"contact.bodies=[{RUBBING}]", "loads.0.value=30 kPa"])
+    done = run(case, tmp_path / "whole")
+    push, _, press = done.summary["contact"]["table"]["force_N"]
+    assert press > 0.1
+    # the table moves towards +x, and the tip holds it back
+    assert -0.301 * press < push < -0.05 * press
+    with pytest.raises(KeyboardInterrupt):
+        run(case, tmp_path / "parts", progress=Watch(interrupt_after=3))
+    resumed = run(case, tmp_path / "parts", resume=True)
+    assert resumed.summary["contact"]["table"]["force_N"][0] == pytest.approx(push, rel=1e-3)
+
+
 FIT = "materials.body={fit: 'soft rubber.csv', models: [yeoh-1, neo-hookean], poisson: 0.499}"
 
 

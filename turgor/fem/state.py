@@ -26,12 +26,16 @@ class State:
         Value of every load ``(n_loads,)``: a cavity's pressure in MPa, a factor for the others.
     penalty
         Factor on the stiffness of contact: raised where surfaces would overlap too much, else one.
+    grips
+        For each contact, what its points hold on to by friction (:mod:`turgor.fem.contact.friction`): the one thing
+        that remembers how a state was reached. Empty where nothing rubs.
     """
 
     u: Floats
     lagged: tuple[Floats, ...]
     loads: Floats
     penalty: float = 1.0
+    grips: tuple[Floats, ...] = ()
 
     def with_loads(self, loads: Floats) -> State:
         """Return a copy under other loads."""

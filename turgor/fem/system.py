@@ -93,7 +93,7 @@ class System:
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
-        self.contacts = [self._contact(materials, case) for case in contact]
+        self.contacts = [self._contact(materials, case, number) for number, case in enumerate(contact)]
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
         self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *embedded, *self.contacts)
@@ -212,9 +212,28 @@ class System:
         field[self.pattern.free] = free
         return self.constraints.from_frames(field.reshape(self.mesh.points.shape))
 
-    def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0) -> State:
+    def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0, grips: tuple[Floats, ...] = ()) -> State:
         """Return the state of displacement `u` in which nothing lags."""
-        return State(u, tuple(term.lagged_at(u, loads) for term in self.terms), loads, penalty)
+        return State(u, tuple(term.lagged_at(u, loads) for term in self.terms), loads, penalty, grips)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction."""
+        return any(contact.friction > 0.0 for contact in self.contacts)
+
+    def gripped(self, state: State, *, dragged: bool) -> State:
+        """Return the state in which friction goes by the normal forces and places that it shows.
+
+        With `dragged`, what slides has dragged along what it holds on to: a new step begins.
+        """
+        return replace(state, grips=tuple(contact.gripped(state, dragged=dragged) for contact in self.contacts))
+
+    def contact_force(self, state: State) -> float:
+        """Return the size (norm) of all nodal forces of contact, N."""
+        total = np.zeros_like(state.u)
+        for contact in self.contacts:
+            contact.force(state, total)
+        return float(np.linalg.norm(total))
 
     def advanced(self, state: State, du: Floats) -> State:
         """Return the state after Newton's step `du`, what lags updated as the step predicts."""
@@ -266,10 +285,10 @@ class System:
         BlockFrames(self.constraints, [nodes]).turn(0, packed)
         return nodes, packed
 
-    def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase) -> Contact:
+    def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
         pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
         channel = self.loads.index(case) if isinstance(case, RigidContact) and case.motion is not None else None
-        return make_contact(self.mesh, materials, case, pressure, channel, self.section)
+        return make_contact(self.mesh, materials, case, pressure, channel, self.section, number)
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)

@@ -289,7 +289,7 @@ def _accepted(
     residuals: list[float],
     compliance: float | None,
 ) -> Equilibrium:
-    state = system.consistent(state.u, state.loads, state.penalty)
+    state = system.consistent(state.u, state.loads, state.penalty, state.grips)
     factorisations = len(residuals) - 1
     if factorisations == 0 or residuals[-2] > NEAR:
         factorise_tangent(system, linear, state)

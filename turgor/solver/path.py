@@ -43,6 +43,12 @@ MONOTONE = 3.0
 STIFFER = 6
 """How often contact is made stiffer before one equilibrium is given up."""
 
+LAGS = 25
+"""How often an equilibrium is found again with the forces of friction that it shows, before it is given up."""
+
+RUBBING = 1e-3
+"""The forces of friction have settled when they change by less than this part of all forces of contact."""
+
 VOLUME_STEPS = 60
 """Steps that volume control may take between two requested loads."""
 
@@ -241,7 +247,8 @@ class _Walk:
         """Shorten the step; where that has not helped, go on by volume control."""
         self._failures += 1
         self.step = CUT * size
-        if self._failures == FAILURES and not self.system.constraints.moves:
+        # Volume control follows one potential; friction's changes from state to state.
+        if self._failures == FAILURES and not (self.system.constraints.moves or self.system.rubs):
             found = self._by_volume(target)
             if found is not None:
                 return found
@@ -293,11 +300,9 @@ class _Walk:
         return found
 
     def _attempt(self, aim: float, guess: State) -> Equilibrium:
-        def report(iteration: int, residual: float) -> None:
-            if self.on_progress is not None:
-                self.on_progress(aim, iteration, residual)
-
-        found = find_equilibrium(self.system, self.linear, guess, aim, self.options.newton, report)
+        if self.system.rubs:
+            guess = replace(guess, grips=self.system.gripped(self.here.state, dragged=True).grips)
+        found = self._found(aim, guess)
         for _ in range(STIFFER):
             overlap = _overlap(self.system, found.state)
             if overlap <= LARGEST_OVERLAP:
@@ -305,11 +310,31 @@ class _Walk:
             penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
             log.info("overlap of %.2g of the wall: contact made stiffer, factor %.3g", overlap, penalty)
             self._tally.count(found)
-            stiffer = replace(found.state, penalty=penalty)
-            found = find_equilibrium(self.system, self.linear, stiffer, aim, self.options.newton, report)
+            found = self._found(aim, replace(found.state, penalty=penalty))
         raise NotConvergedError(
             "surfaces overlap too much however stiff their contact is", facts={"overlap_per_wall": overlap}
         )
+
+    def _found(self, aim: float, guess: State) -> Equilibrium:
+        """Return the equilibrium in which friction goes by the normal forces of the equilibrium itself."""
+
+        def report(iteration: int, residual: float) -> None:
+            if self.on_progress is not None:
+                self.on_progress(aim, iteration, residual)
+
+        system, newton = self.system, self.options.newton
+        found = find_equilibrium(system, self.linear, guess, aim, newton, report)
+        for _ in range(LAGS if system.rubs else 0):
+            state = system.gripped(found.state, dragged=False)
+            force, scale = system.forces(state)
+            allowed = max(newton.tolerance * scale, RUBBING * system.contact_force(state))
+            if np.linalg.norm(system.free_part(force)) <= allowed:
+                return found
+            self._tally.count(found)
+            found = find_equilibrium(system, self.linear, state, aim, newton, report)
+        if system.rubs:
+            raise NotConvergedError("the forces of friction do not settle")
+        return found
 
     def _predicted(self, aim: float) -> State:
         """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out.

@@ -14,6 +14,8 @@ from turgor.geometry.space import Place
 from turgor.study.boundary import Direction
 from turgor.study.validation import StrictModel, invalid
 
+Friction = Annotated[float, Field(ge=0.0, le=10.0)]
+
 
 class _RigidCase(StrictModel):
     """What all rigid bodies share: which surface may meet them, and how they move."""
@@ -21,10 +23,12 @@ class _RigidCase(StrictModel):
     name: str | None = Field(default=None, min_length=1, description="in results; left out, the body's type")
     surface: str | None = Field(default=None, description="what may meet the body; left out, the whole skin")
     move: tuple[Length, Length, Length] | None = Field(default=None, description="displacement at the full load")
+    friction: Friction | None = Field(default=None, description="coefficient; left out, that of the contact")
 
-    def build(self, label: str) -> RigidContact:
-        """Return the contact with this body."""
-        return RigidContact(self.body(), self.surface, self.move, label)
+    def build(self, label: str, friction: float) -> RigidContact:
+        """Return the contact with this body; `friction` is the coefficient where it has none of its own."""
+        own = friction if self.friction is None else self.friction
+        return RigidContact(self.body(), self.surface, self.move, label, own)
 
     def body(self) -> RigidBody:
         """Return the body."""
@@ -103,6 +107,7 @@ class ContactCase(StrictModel):
     self: bool = Field(default=False, strict=True, description="any part of the skin with any other")
     pairs: tuple[tuple[str, str], ...] = Field(default=(), description="two surfaces each")
     bodies: tuple[RigidCase, ...] = Field(default=(), description="rigid bodies")
+    friction: Friction = Field(default=0.0, description="coefficient of friction wherever something touches")
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
@@ -121,9 +126,10 @@ class ContactCase(StrictModel):
 
     def build(self) -> list[Contact]:
         """Return the contacts."""
-        own = [SelfContact()] if self.self else []
-        pairs = [PairContact(*names) for names in self.pairs]
-        return [*own, *pairs, *(body.build(label) for body, label in zip(self.bodies, self.labels, strict=True))]
+        own = [SelfContact(self.friction)] if self.self else []
+        pairs = [PairContact(*names, self.friction) for names in self.pairs]
+        labelled = zip(self.bodies, self.labels, strict=True)
+        return [*own, *pairs, *(body.build(label, self.friction) for body, label in labelled)]
 
 
 def _shorthand(value: object) -> object:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.term import Touch
 from turgor.fem.fields import von_mises
 from turgor.fem.state import State
@@ -49,6 +50,7 @@ def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: floa
             "residual": float(equilibrium.residuals[-1]),
             "wall_s": wall_s,
             "contact_penalty": state.penalty,
+            "contact_grips": [rows.tolist() for rows in state.grips],
         },
     )
 
@@ -119,7 +121,8 @@ def _touch(touch: Touch) -> dict[str, Any]:
 def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     """Return the equilibrium that a record was made of, as a start for the solver."""
     loads = np.array([record.loads[name] for name in system.load_names])
-    state = system.consistent(np.array(record.displacement), loads, record.solver["contact_penalty"])
+    grips = tuple(np.array(rows).reshape(-1, WIDTH) for rows in record.solver["contact_grips"])
+    state = system.consistent(np.array(record.displacement), loads, record.solver["contact_penalty"], grips)
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.skin import STIFFNESS, Skin
 from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
 from turgor.fem.pattern import packed_size
@@ -37,6 +38,10 @@ class Obstacle:
         Of the contact.
     turned
         Whether the model is a body of revolution, around whose axis y all forces across it cancel.
+    friction
+        Coefficient of friction.
+    number
+        Place of what it remembers in ``State.grips``.
 
     Attributes
     ----------
@@ -47,7 +52,15 @@ class Obstacle:
     nodes = NO_NODES
 
     def __init__(
-        self, skin: Skin, body: RigidBody, motion: Floats, channel: int | None, name: str, turned: bool = False
+        self,
+        skin: Skin,
+        body: RigidBody,
+        motion: Floats,
+        channel: int | None,
+        name: str,
+        turned: bool = False,
+        friction: float = 0.0,
+        number: int = 0,
     ) -> None:
         self.skin = skin
         self.body = body
@@ -55,12 +68,15 @@ class Obstacle:
         self.moves = channel is not None
         self.channel = -1 if channel is None else channel
         self.name = name
+        self.friction = friction
         self._turned = turned
+        self._number = number
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
         gap, _, _ = self._gaps(state.u, state.loads)
-        return 0.5 * float(np.sum(self._normal_stiffness(state) * np.minimum(gap, 0.0) ** 2))
+        normal = 0.5 * float(np.sum(self._normal_stiffness(state) * np.minimum(gap, 0.0) ** 2))
+        return normal + self._rubbing(state).energy
 
     def merit(self, state: State, lagged: Floats) -> float:
         """Return the energy."""
@@ -71,6 +87,7 @@ class Obstacle:
         """Add the contact forces, N."""
         push = self._pushes(state)
         touching = np.flatnonzero(push.any(axis=(1, 2)))
+        self._rubbing(state).add_force(out)
         add_at_nodes(self.skin.faces[touching], np.einsum("qa,fqi->fai", self.skin.shape, push[touching]), out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
@@ -90,7 +107,8 @@ class Obstacle:
         full = full.reshape(len(touching), rows, rows)
         packed = np.empty((len(touching), packed_size(rows)))
         pack_symmetric(full, packed)
-        return self.skin.faces[touching], packed
+        rubbing = self._rubbing(state)
+        return np.vstack([self.skin.faces[touching], rubbing.nodes]), np.vstack([packed, rubbing.blocks()])
 
     def couplings(self, u: Floats) -> Ints:
         """Return nothing: the nodes of a face are coupled anyway."""
@@ -109,7 +127,8 @@ class Obstacle:
 
     def conjugate(self, state: State) -> float:
         """Return the body's force times its motion, N mm."""
-        return float(self._pushes(state).sum(axis=(0, 1)) @ self.motion)
+        push = self._pushes(state).sum(axis=(0, 1)) + self._rubbing(state).drag.sum(axis=0)
+        return float(push @ self.motion)
 
     def load_gradient(self, state: State, out: Floats) -> None:
         """Add the derivative of the contact forces by the factor, N."""
@@ -118,6 +137,8 @@ class Obstacle:
         change = (normal @ self.motion)[:, :, None] * normal + gap[:, :, None] * (curvature @ self.motion)
         values = np.einsum("qa,fqi->fai", self.skin.shape, -stiffness[:, :, None] * change)
         add_at_nodes(self.skin.faces, values, out)
+        rubbing = self._rubbing(state)
+        add_at_nodes(rubbing.nodes, -rubbing.weights[:, :, None] * (rubbing.tangent @ self.motion)[:, None, :], out)
 
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much."""
@@ -148,9 +169,34 @@ class Obstacle:
             torque=torque,
         )
 
+    def gripped(self, state: State, *, dragged: bool) -> Floats:
+        """Return what friction remembers; see :class:`turgor.fem.contact.term.Contact`."""
+        rows = grips_in(state, self._number)
+        if self.friction == 0.0:
+            return rows
+        gap, normal, _ = self._gaps(state.u, state.loads)
+        face, quad = np.nonzero(gap < 0.0)
+        force = -(self._normal_stiffness(state) * gap)[face, quad]
+        place = (self._places(state.u) - self._shift(state.loads))[face, quad]
+        rubs = self._rubbing(state)
+        slip = rubs.elastic_slip if dragged else rubs.slip
+        return renewed(rows, slip, make_rows(face, quad, force, normal[face, quad], place))
+
+    def _rubbing(self, state: State) -> Rubbing:
+        rows, d = grips_in(state, self._number), self.skin.dimension
+        face, quad, nodes = points_of(rows, self.skin)
+        weights = self.skin.shape[quad]
+        here = np.einsum("na,nai->ni", weights, self.skin.points[nodes][:, :, :d] + state.u[nodes])
+        apart = here - self._shift(state.loads) - rows[:, PLACE][:, :d]
+        stiffness = self._normal_stiffness(state)[face, quad]
+        return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
+
     def _resultants(self, state: State) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return force and torque on the body, of three components also in a plane model."""
         push = self._pushes(state)
+        rows = grips_in(state, self._number)
+        face, quad, _ = points_of(rows, self.skin)
+        np.add.at(push, (face, quad), self._rubbing(state).drag)
         arm = self._places(state.u) - (self.body.reference_point + self._shift(state.loads))
         push, arm = (np.pad(v.reshape(-1, v.shape[2]), ((0, 0), (0, 3 - v.shape[2]))) for v in (push, arm))
         force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)

@@ -84,7 +84,7 @@ class Skin:
         pressure: float,
         section: Section | None = None,
     ) -> None:
-        cell = face_cell(faces)
+        self._cell = cell = face_cell(faces)
         self.dimension = mesh.dimension
         self.points = _in_space(mesh.points)
         self.faces = np.ascontiguousarray(faces, dtype=np.int32)
@@ -116,6 +116,10 @@ class Skin:
         x = self.points.copy()
         x[:, : self.dimension] += u
         return x
+
+    def shape_at(self, local: Floats) -> Floats:
+        """Return the shape functions ``(p, n)`` at local points ``(p, 2)``."""
+        return self._cell.shape(local[:, : self._cell.dimension])
 
 
 def wall_thickness(centre: Floats, normal: Floats) -> Floats:

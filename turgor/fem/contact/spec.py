@@ -25,7 +25,18 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class SelfContact:
-    """Any part of the skin may meet any other; which ones do is found on the way."""
+    """Any part of the skin may meet any other; which ones do is found on the way.
+
+    Attributes
+    ----------
+    friction
+        Coefficient of friction, 0 or more.
+    """
+
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_friction(self.friction)
 
     @property
     def name(self) -> str:
@@ -35,10 +46,14 @@ class SelfContact:
 
 @dataclass(frozen=True)
 class PairContact:
-    """Two surfaces of the mesh may meet each other."""
+    """Two surfaces of the mesh may meet each other, with a coefficient of friction."""
 
     first: str
     second: str
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_friction(self.friction)
 
     @property
     def name(self) -> str:
@@ -60,12 +75,18 @@ class RigidContact:
         Its displacement at load fraction one, mm, in proportion before; ``None``: it stands still.
     label
         What the body is called in results.
+    friction
+        Coefficient of friction, 0 or more.
     """
 
     body: RigidBody
     surface: str | None = None
     motion: Vector | None = None
     label: str = "body"
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_friction(self.friction)
 
     @property
     def name(self) -> str:
@@ -83,6 +104,7 @@ def make_contact(
     pressure: float,
     channel: int | None,
     section: Section | None = None,
+    number: int = 0,
 ) -> Contact:
     """Return the term of a contact.
 
@@ -98,6 +120,8 @@ def make_contact(
         Place of the motion's factor in ``State.loads``, for a rigid body that moves.
     section
         What a plane mesh stands for.
+    number
+        Place of what friction remembers in ``State.grips``.
 
     Raises
     ------
@@ -110,13 +134,20 @@ def make_contact(
         faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
         body, motion = _fitting(case, mesh, section)
         turned = isinstance(section, Axisymmetric)
-        return Obstacle(Skin(mesh, faces, materials, pressure, section), body, motion, channel, case.name, turned)
+        skin = Skin(mesh, faces, materials, pressure, section)
+        return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number)
     if isinstance(case, PairContact):
         first, second = mesh.surface(case.first), mesh.surface(case.second)
         group = np.repeat(np.array([0, 1], np.int32), [len(first), len(second)])
         skin = Skin(mesh, np.vstack([first, second]), materials, pressure, section)
-        return SurfaceContact(skin, group, case.name)
-    return SurfaceContact(Skin(mesh, _whole(mesh, section), materials, pressure, section), None, case.name)
+        return SurfaceContact(skin, group, case.name, case.friction, number)
+    skin = Skin(mesh, _whole(mesh, section), materials, pressure, section)
+    return SurfaceContact(skin, None, case.name, case.friction, number)
+
+
+def _check_friction(friction: float) -> None:
+    if not 0.0 <= friction < np.inf:
+        raise InputError("a coefficient of friction is not negative", key="contact.friction", value=friction)
 
 
 def _whole(mesh: Mesh, section: Section | None) -> Ints:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.pairs import NOWHERE, balls, find_partners, gap_gradients, pair_stiffness
 from turgor.fem.contact.search import Search
 from turgor.fem.contact.skin import STIFFNESS, Skin
@@ -64,20 +65,27 @@ class SurfaceContact:
         Number of each face's group ``(k,)``: only faces of different groups meet. ``None``: any may meet any.
     name
         Of the contact.
+    friction
+        Coefficient of friction.
+    number
+        Place of what it remembers in ``State.grips``.
     """
 
     nodes = NO_NODES
 
-    def __init__(self, skin: Skin, group: Ints | None, name: str) -> None:
+    def __init__(self, skin: Skin, group: Ints | None, name: str, friction: float = 0.0, number: int = 0) -> None:
         self.skin = skin
         self.name = name
+        self.friction = friction
+        self._number = number
         self._search = Search(skin, group)
         self._found: list[tuple[Floats, Pairs]] = []
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
         pairs = self._touching(state.u)
-        return 0.5 * float(np.sum(self._normal_stiffness(state, pairs) * pairs.gap**2))
+        normal = 0.5 * float(np.sum(self._normal_stiffness(state, pairs) * pairs.gap**2))
+        return normal + self._rubbing(state).energy
 
     def merit(self, state: State, lagged: Floats) -> float:
         """Return the energy: the overlaps are not stiff enough to be taken as unknowns in it."""
@@ -89,6 +97,7 @@ class SurfaceContact:
         pairs = self._touching(state.u)
         force = self._normal_stiffness(state, pairs) * pairs.gap
         add_at_nodes(self._nodes(pairs), force[:, None, None] * self._gradients(state.u, pairs), out)
+        self._rubbing(state).add_force(out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
@@ -103,7 +112,8 @@ class SurfaceContact:
         slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
         x, d = skin.space(state.u), skin.dimension
         pair_stiffness(x, slaves, masters, pairs.at, pairs.local, pairs.gap, stiffness, force, d, packed)
-        return nodes, packed
+        rubbing = self._rubbing(state)
+        return np.vstack([nodes, rubbing.nodes]), np.vstack([packed, rubbing.blocks()])
 
     def couplings(self, u: Floats) -> Ints:
         """Return the nodes of all pairs of faces near each other, of which one meets something soon."""
@@ -164,6 +174,34 @@ class SurfaceContact:
             overlap_per_wall=float((-pairs.gap / wall).max(initial=0.0)),
         )
 
+    def gripped(self, state: State, *, dragged: bool) -> Floats:
+        """Return what friction remembers; see :class:`turgor.fem.contact.term.Contact`.
+
+        A place is a face and the local coordinates of the closest point on it.
+        """
+        rows = grips_in(state, self._number)
+        if self.friction == 0.0:
+            return rows
+        pairs = self._touching(state.u)
+        force = -self._normal_stiffness(state, pairs) * pairs.gap
+        # The slave's part of the gap's gradient is its normal times shape functions, whose sum is one.
+        normal = self._gradients(state.u, pairs)[:, : self.skin.faces.shape[1]].sum(axis=1)
+        place = np.column_stack([pairs.masters, pairs.local])
+        rubs = self._rubbing(state)
+        slip = rubs.elastic_slip if dragged else rubs.slip
+        return renewed(rows, slip, make_rows(pairs.face, pairs.quad, force, normal, place))
+
+    def _rubbing(self, state: State) -> Rubbing:
+        rows, d = grips_in(state, self._number), self.skin.dimension
+        face, quad, slaves = points_of(rows, self.skin)
+        other = rows[:, PLACE][:, 0].astype(np.int32)
+        local = rows[:, PLACE][:, 1:]
+        nodes = np.hstack([slaves, self.skin.faces[other]])
+        weights = np.hstack([self.skin.shape[quad], -self.skin.shape_at(local)])
+        apart = np.einsum("na,nai->ni", weights, self.skin.points[nodes][:, :, :d] + state.u[nodes])
+        stiffness = self._stiffness_between(state, face, quad, other)
+        return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
+
     def _touching(self, u: Floats) -> Pairs:
         for at, found in self._found:
             if np.array_equal(at, u):
@@ -199,10 +237,13 @@ class SurfaceContact:
         return np.asarray(np.einsum("nai,nai->n", self._gradients(u, pairs), du[self._nodes(pairs)]))
 
     def _normal_stiffness(self, state: State, pairs: Pairs) -> Floats:
+        return self._stiffness_between(state, pairs.face, pairs.quad, pairs.masters)
+
+    def _stiffness_between(self, state: State, face: Indices | Ints, quad: Indices | Ints, other: Ints) -> Floats:
         skin = self.skin
-        load = np.minimum(skin.load[pairs.face], skin.load[pairs.masters])
-        grip = np.minimum(skin.grip[pairs.face], skin.grip[pairs.masters])
-        return np.asarray(state.penalty * STIFFNESS * load / grip * 0.5 * skin.area[pairs.face, pairs.quad])
+        load = np.minimum(skin.load[face], skin.load[other])
+        grip = np.minimum(skin.grip[face], skin.grip[other])
+        return np.asarray(state.penalty * STIFFNESS * load / grip * 0.5 * skin.area[face, quad])
 
     def _depth(self, pairs: Pairs) -> Floats:
         return np.asarray(np.minimum(self.skin.depth[pairs.face], self.skin.depth[pairs.masters]))

@@ -54,6 +54,7 @@ class Contact(Term, Protocol):
     """A term whose stiffness couples other nodes in every state."""
 
     name: str
+    friction: float
 
     def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
         """Return the nodes ``(n_blocks, nodes_per_block)`` coupled now and their packed stiffnesses."""
@@ -69,4 +70,11 @@ class Contact(Term, Protocol):
 
     def touch(self, state: State) -> Touch:
         """Return how the contact stands."""
+        ...
+
+    def gripped(self, state: State, *, dragged: bool) -> Floats:
+        """Return what friction remembers if it goes by the forces, normals and places of this state.
+
+        With `dragged`, what slides has dragged along what it holds on to: a new step begins.
+        """
         ...
