@@ -40,7 +40,8 @@ def von_mises(system: System, state: State) -> VonMises:
     nodal = np.zeros(system.mesh.n_points)
     weight = np.zeros(system.mesh.n_points)
     points, volumes = [], []
-    extrapolate = _extrapolation(system.mesh.cell)
+    cell = system.mesh.cell
+    extrapolate = extrapolation(cell, cell.nodes)
     for solid in system.solids:
         at_points = _von_mises(solid.cauchy_stress(state))
         at_nodes = np.maximum(at_points @ extrapolate.T, 0.0)
@@ -50,7 +51,7 @@ def von_mises(system: System, state: State) -> VonMises:
         points.append(at_points.ravel())
         volumes.append(solid.dV.ravel())
     values = np.concatenate(points)
-    return VonMises(nodal / weight, float(values.max()), _volume_percentile(values, np.concatenate(volumes), 0.99))
+    return VonMises(nodal / weight, float(values.max()), weighted_percentile(values, np.concatenate(volumes), 0.99))
 
 
 def _von_mises(stress: Floats) -> Floats:
@@ -60,13 +61,14 @@ def _von_mises(stress: Floats) -> Floats:
     return np.asarray(np.sqrt(0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * shear))
 
 
-def _extrapolation(cell: Cell) -> Floats:
-    """Return the matrix ``(n, q)`` that continues the linear function fitted to the quadrature points to the nodes.
+def extrapolation(cell: Cell, places: Floats) -> Floats:
+    """Return the matrix ``(p, q)`` that continues the linear function fitted to the quadrature points to other places.
 
-    In quadrilaterals and hexahedra it is linear in each coordinate.
+    `places` are reference coordinates ``(p, dimension)``. In quadrilaterals and hexahedra the function is linear in
+    each coordinate.
     """
-    at_nodes, at_points = (_linear(places, cell.simplex) for places in (cell.nodes, cell.points))
-    return np.asarray(at_nodes @ np.linalg.pinv(at_points))
+    at_places, at_points = (_linear(where, cell.simplex) for where in (places, cell.points))
+    return np.asarray(at_places @ np.linalg.pinv(at_points))
 
 
 def _linear(places: Floats, simplex: bool) -> Floats:
@@ -76,7 +78,8 @@ def _linear(places: Floats, simplex: bool) -> Floats:
     return np.asarray(np.prod(places[:, None, :] ** powers, axis=2))
 
 
-def _volume_percentile(values: Floats, volumes: Floats, part: float) -> float:
+def weighted_percentile(values: Floats, weights: Floats, part: float) -> float:
+    """Return the value that is exceeded in no more than 1 − `part` of the `weights`; both arrays are flat."""
     order = np.argsort(values)
-    reached = np.cumsum(volumes[order]) >= part * volumes.sum()
+    reached = np.cumsum(weights[order]) >= part * weights.sum()
     return float(values[order][np.argmax(reached)])

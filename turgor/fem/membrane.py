@@ -11,7 +11,7 @@ from turgor.common.errors import InputError
 from turgor.fem.state import State
 from turgor.fem.term import add_at_nodes, pack_symmetric
 from turgor.mesh.cells import Cell, body_cell
-from turgor.mesh.faces import boundary_faces
+from turgor.mesh.faces import all_faces, shared_faces
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -178,9 +178,8 @@ def _plane_stress(membrane: Membrane) -> Floats:
 def _faces(mesh: Mesh, membrane: Membrane) -> Ints:
     if isinstance(membrane.surface, str):
         return mesh.surface(membrane.surface)
-    faces = np.vstack([boundary_faces(mesh.cells[mesh.region(name)]) for name in membrane.surface])
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    shared = first[count == 2]
+    first, second = (mesh.cells[mesh.region(name)] for name in membrane.surface)
+    shared = shared_faces(first, second)
     if len(shared) == 0:
         raise InputError("the two regions have no face in common", key="membranes.surface", value=membrane.name)
-    return np.asarray(faces[np.sort(shared)])
+    return np.asarray(all_faces(first)[shared])

@@ -36,6 +36,17 @@ def host_cells(cells: Ints, faces: Ints) -> Ints:
     return owner[inverse[len(own) :]]
 
 
+def shared_faces(first: Ints, second: Ints) -> Ints:
+    """Return which of the faces of the `first` cells are faces of the `second` ones too, ``(k,)``.
+
+    The numbers count the rows of ``all_faces(first)``, whose faces look into the second cells.
+    """
+    own, other = _keys(all_faces(first)), _keys(all_faces(second))
+    _, inverse = np.unique(np.vstack([own, other]), axis=0, return_inverse=True)
+    found: Ints = np.flatnonzero(np.isin(inverse[: len(own)], inverse[len(own) :])).astype(np.int32)
+    return found
+
+
 def outward_faces(cells: Ints, corners: Ints) -> Ints:
     """Return the boundary faces, oriented outward, that have the given corner nodes.
 
