@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box
-from turgor.results.measures import cavity_volume
 from turgor.results.record import StepRecord
 from turgor.results.store import RunStore
+from turgor.results.stored import Body, StoredState
 from turgor.results.summary import summarise
 
 FloatArray = npt.NDArray[np.float64]
@@ -62,6 +64,12 @@ def rod(points: FloatArray, bending: float, twist: float = 0.0, stretch: float =
     return axis + turned.apply(points * [0.0, 1.0, 1.0]) - points
 
 
+def moved(body: Body, displacement: FloatArray, **changes: Any) -> StoredState:
+    """A state of a body whose nodes have moved by `displacement`, with other fields of its record changed."""
+    record = replace(body.at_rest().record, displacement=np.asarray(displacement), **changes)
+    return StoredState(body, record)
+
+
 def bent_record(mesh: Mesh, index: int, fraction: float, full_bending: float = math.radians(200.0)) -> StepRecord:
     """A state on the way to `full_bending`, with a von Mises stress that grows away from the bending axis."""
     displacement = rod(mesh.points, fraction * full_bending)
@@ -76,7 +84,7 @@ def bent_record(mesh: Mesh, index: int, fraction: float, full_bending: float = m
         von_mises=von_mises,
         von_mises_max=float(von_mises.max()) * 1.1,
         von_mises_p99=float(np.quantile(von_mises, 0.99)),
-        cavity_volumes={"cavity": cavity_volume(mesh, displacement, "cavity")},
+        cavity_volumes={"cavity": Body(mesh).enclosed_volume("cavity", displacement)},
         solver={"iterations": 4, "factorisations": 4, "stable": True, "residual": 1e-9, "wall_s": 0.5},
     )
 

@@ -17,6 +17,7 @@ from turgor.results import pictures
 from turgor.results.camera import camera_for
 from turgor.results.pictures import SIZE, draw
 from turgor.results.skin import compact, flat_triangles, outside_faces, smooth_patches
+from turgor.results.stored import Body
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -28,7 +29,7 @@ def pixels(png: bytes) -> np.ndarray:
 def drawn(finger: Mesh) -> pictures.Pictures:
     records = [bent_record(finger, index, fraction) for index, fraction in enumerate((0.25, 1.0))]
     try:
-        return draw(finger, records, ["10 kPa", "40 kPa"], 0.08)
+        return draw(Body(finger), records, ["10 kPa", "40 kPa"], 0.08)
     except MissingPackageError as error:
         pytest.skip(str(error))
 
@@ -65,7 +66,7 @@ def test_a_process_that_dies_leaves_a_message_with_the_packages(
 
     monkeypatch.setattr(pictures.subprocess, "run", killed)
     with pytest.raises(MissingPackageError, match="apt-get install libegl1 libgl1 libgl1-mesa-dri"):
-        draw(small_finger, [bent_record(small_finger, 0, 1.0)], ["40 kPa"], 0.08)
+        draw(Body(small_finger), [bent_record(small_finger, 0, 1.0)], ["40 kPa"], 0.08)
 
 
 def test_a_library_that_is_missing_is_named_with_its_package(
@@ -75,7 +76,7 @@ def test_a_library_that_is_missing_is_named_with_its_package(
     failed = subprocess.CompletedProcess([], 1, "", loader)
     monkeypatch.setattr(pictures.subprocess, "run", lambda *_, **__: failed)
     with pytest.raises(MissingPackageError, match="apt-get install libxrender1"):
-        draw(small_finger, [bent_record(small_finger, 0, 1.0)], ["40 kPa"], 0.08)
+        draw(Body(small_finger), [bent_record(small_finger, 0, 1.0)], ["40 kPa"], 0.08)
 
 
 @pytest.mark.parametrize("turn", range(6))

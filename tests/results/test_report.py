@@ -21,6 +21,7 @@ from turgor.results import report as report_module
 from turgor.results.pictures import Pictures
 from turgor.results.report import number, report
 from turgor.results.store import RunStore
+from turgor.results.stored import Body
 
 FIT = {
     "fits": [
@@ -120,7 +121,7 @@ def test_the_whole_report_with_real_pictures(folder: Path) -> None:
 @pytest.mark.usefixtures("without_pictures")
 def test_the_moving_body_comes_back_from_its_packing(folder: Path, finger: Mesh) -> None:
     packed = frames_of(report(folder).read_text(encoding="utf-8"))
-    surface = animation.drawn_surface(finger, quartered=True)
+    surface = animation.drawn_surface(Body(finger), quartered=True)
     triangles = np.frombuffer(base64.b64decode(packed["triangles"]), "<i4").reshape(3, -1).T
     assert np.array_equal(triangles, surface.triangles)
     store = RunStore.open(folder)
@@ -129,9 +130,9 @@ def test_the_moving_body_comes_back_from_its_packing(folder: Path, finger: Mesh)
     for record, frame in zip(store.records(), packed["frames"][1:], strict=True):
         levels = np.frombuffer(base64.b64decode(frame["xyz"]), "<u2").reshape(3, -1).T
         places = np.array(packed["origin"]) + packed["step"] * levels
-        assert places == pytest.approx((finger.points + record.displacement)[surface.nodes], abs=packed["step"])
+        assert places == pytest.approx(surface.places(finger.points + record.displacement), abs=packed["step"])
         colours = np.frombuffer(base64.b64decode(frame["colour"]), np.uint8) * packed["colourStep"]
-        assert colours == pytest.approx(record.von_mises[surface.nodes], abs=packed["colourStep"])
+        assert colours == pytest.approx(surface.values(record.von_mises), abs=packed["colourStep"])
     assert packed["step"] < 0.003
     assert packed["frames"][3]["label"] == "24 kPa · bent by 120.0°"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from turgor.results.measures import MEASURES
 from turgor.study.boundary import DisplacementCase, ElasticCase, ForceCase, GravityCase, PressureCase, TractionCase
 from turgor.study.case import Case, MeshCase, SolverCase, load_case
 from turgor.study.contact import BoxCase, ContactCase, CylinderCase, PlaneCase, SphereCase
@@ -22,6 +23,7 @@ from turgor.study.reinforcement import (
 )
 from turgor.study.specimen import SpecimenCase
 
+RESULTS = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
 TEXT = (Path(__file__).parents[2] / "docs" / "cases.md").read_text(encoding="utf-8")
 
 
@@ -32,6 +34,13 @@ def test_the_case_of_the_page_loads(tmp_path: Path) -> None:
     case = load_case(tmp_path / "page.yaml")
     assert case.full_pressure == pytest.approx(0.03)
     assert case.mesh.size == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("name", MEASURES)
+def test_every_measure_is_on_the_page_of_results(name: str) -> None:
+    (line,) = [line for line in RESULTS.splitlines() if re.match(rf"\| `{name}`", line)]
+    for parameter in MEASURES[name].parameters.model_fields:
+        assert re.search(rf"`{parameter}`", line) or "those of `centreline`" in line, parameter
 
 
 @pytest.mark.parametrize(

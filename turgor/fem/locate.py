@@ -31,16 +31,16 @@ def locate(points: Floats, cells: Ints, places: Floats, name: str) -> tuple[Ints
     Parameters
     ----------
     points, cells
-        The mesh: positions ``(n_points, 3)`` and solid cells ``(m, n_nodes)``.
+        The mesh: positions ``(n_points, d)`` and the body's cells ``(m, n_nodes)``.
     places
-        Where to look, ``(k, 3)``, mm.
+        Where to look, ``(k, d)``, mm.
     name
         What the places belong to, for the message.
 
     Returns
     -------
     cell, local
-        The host cells ``(k,)`` and the reference coordinates in them ``(k, 3)``.
+        The host cells ``(k,)`` and the reference coordinates in them ``(k, d)``.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _candidates(nodes: Floats, places: Floats) -> tuple[NDArray[np.intp], NDArra
 
 
 def _inverted(cell: Cell, nodes: Floats, places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Invert the map of each cell with `nodes` ``(p, n_nodes, 3)`` at its place; say where that succeeded."""
+    """Invert the map of each cell with `nodes` ``(p, n_nodes, d)`` at its place; say where that succeeded."""
     local = np.tile(cell.nodes.mean(axis=0), (len(places), 1))
     size = np.ptp(nodes, axis=1).max(axis=1)
     found = np.zeros(len(places), bool)
@@ -92,7 +92,7 @@ def _inverted(cell: Cell, nodes: Floats, places: Floats) -> tuple[Floats, NDArra
             break
         jacobian = np.einsum("pai,paj->pij", nodes, cell.gradient(local))
         # Far outside the element its map may fold; such a place is no candidate, so keep the iterate near.
-        folded = np.abs(np.linalg.det(jacobian)) < 1e-9 * size**3
-        jacobian[folded] = np.eye(3) * size[folded, None, None]
+        folded = np.abs(np.linalg.det(jacobian)) < 1e-9 * size**cell.dimension
+        jacobian[folded] = np.eye(cell.dimension) * size[folded, None, None]
         local = np.clip(local + np.linalg.solve(jacobian, gap[:, :, None])[:, :, 0], -1.0, 2.0)
     return local, found

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.geometry.section import PlaneSection
 from turgor.mesh.cells import face_cell, face_frames
 from turgor.mesh.mesh import Mesh
 
@@ -39,6 +40,16 @@ Section = PlaneStrain | PlaneStress | Axisymmetric
 
 ON_AXIS = 1e-9
 """A node lies on the axis of revolution if its distance is no more than this part of the body's size."""
+
+
+def section_of(plane: PlaneSection | None) -> Section | None:
+    """Return what the mechanics make of a plane drawing; None for a body in space."""
+    if plane is None:
+        return None
+    if plane.kind == "axisymmetric":
+        return Axisymmetric()
+    kind = PlaneStrain if plane.kind == "plane-strain" else PlaneStress
+    return kind() if plane.thickness is None else kind(plane.thickness)
 
 
 def depth(section: Section | None, places: Floats) -> Floats:

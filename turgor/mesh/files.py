@@ -38,6 +38,11 @@ Sets = dict[tuple[str, str], IntArray]
 """Kind and name of each set → nodes of its cells, one row a cell."""
 
 
+def meshio_name(cells: IntArray) -> str:
+    """Return what meshio calls the kind of `cells` ``(m, n_nodes)``."""
+    return _TYPES[cells.shape[1]][0]
+
+
 def write(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh with its names to a .msh (gmsh 2.2, binary) or .vtu file.
 
@@ -105,9 +110,7 @@ def _from_sets(points: FloatArray, sets: Sets) -> Mesh:
         raise InputError("the file mixes cells of several kinds")
     cells = np.vstack(blocks)
     if not is_body_cell(cells.shape[1]):
-        raise InputError(
-            "the regions of the file are of no kind of cell that is known", value=_TYPES[cells.shape[1]][0]
-        )
+        raise InputError("the regions of the file are of no kind of cell that is known", value=meshio_name(cells))
     points = points[:, : body_cell(cells).dimension]
     used = np.unique(cells)
     index = np.full(len(points), -1, dtype=np.int32)
@@ -131,7 +134,7 @@ def _of_kind(sets: Sets, wanted: str) -> Iterator[tuple[str, IntArray]]:
 
 
 def _blocks(sets: Sets) -> list[tuple[str, IntArray]]:
-    return [(_TYPES[cells.shape[1]][0], cells) for cells in sets.values()]
+    return [(meshio_name(cells), cells) for cells in sets.values()]
 
 
 def _write_msh(path: Path, points: FloatArray, sets: Sets) -> None:

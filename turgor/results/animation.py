@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
-from turgor.results.skin import flat_triangles, outside_faces, smooth_patches
+from turgor.results.drawing import Drawing, drawing_of
+from turgor.results.skin import flat_triangles, smooth_patches
+from turgor.results.stored import Body
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -24,32 +25,44 @@ _BYTES_PER_NODE = 7 * 4 / 3  # three 16-bit coordinates and one byte of colour, 
 _POSITION_LEVELS, _COLOUR_LEVELS = 2**16 - 1, 2**8 - 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrawnSurface:
-    """The outside of a body as flat triangles, with nodes of its own on either side of a sharp edge.
+    """What is drawn of a body as flat triangles, with points of its own on either side of a sharp edge.
 
     Parameters
     ----------
+    drawing
+        The curved triangles that they approximate.
     nodes
-        Node of the mesh that each drawn node is, shape ``(d,)``.
+        Point of the drawing that each drawn node is, shape ``(d,)``.
     triangles
         Drawn nodes of each triangle, shape ``(j, 3)``.
     """
 
+    drawing: Drawing
     nodes: IntArray
     triangles: IntArray
 
+    def places(self, positions: FloatArray) -> FloatArray:
+        """Return the places ``(d, 3)`` of the drawn nodes where the mesh's are at `positions` ``(n, d)``."""
+        return self.drawing.places(positions)[self.nodes]
 
-def drawn_surface(mesh: Mesh, *, quartered: bool) -> DrawnSurface:
-    """Return the outside of the body; `quartered`: each curved face as four flat triangles instead of one."""
-    faces = outside_faces(mesh)
-    patches = smooth_patches(mesh.points, faces)
-    triangles = flat_triangles(faces, quartered=quartered)
-    patch = np.repeat(patches, len(triangles) // len(faces))[:, None]
-    keys = patch.astype(np.int64) * mesh.n_points + triangles
+    def values(self, nodal: FloatArray) -> FloatArray:
+        """Return a nodal quantity ``(n,)`` of the mesh at the drawn nodes, ``(d,)``."""
+        return np.asarray(nodal[self.drawing.source[self.nodes]])
+
+
+def drawn_surface(body: Body, *, quartered: bool) -> DrawnSurface:
+    """Return what is drawn of the body; `quartered`: each curved face as four flat triangles instead of one."""
+    drawing = drawing_of(body)
+    patches = smooth_patches(drawing.places(body.mesh.points), drawing.faces)
+    triangles = flat_triangles(drawing.faces, quartered=quartered)
+    patch = np.repeat(patches, len(triangles) // len(drawing.faces))[:, None]
+    n_points = len(drawing.source)
+    keys = patch.astype(np.int64) * n_points + triangles
     distinct, inverse = np.unique(keys, return_inverse=True)
-    nodes = np.asarray(distinct % mesh.n_points, dtype=np.int32)
-    return DrawnSurface(nodes, np.asarray(inverse.reshape(triangles.shape), dtype=np.int32))
+    nodes = np.asarray(distinct % n_points, dtype=np.int32)
+    return DrawnSurface(drawing, nodes, np.asarray(inverse.reshape(triangles.shape), dtype=np.int32))
 
 
 def frames_that_fit(n_steps: int, n_nodes: int) -> list[int]:
@@ -58,12 +71,12 @@ def frames_that_fit(n_steps: int, n_nodes: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, n_steps - 1, min(n_steps, most))})
 
 
-def surface_that_fits(mesh: Mesh, n_steps: int) -> DrawnSurface:
+def surface_that_fits(body: Body, n_steps: int) -> DrawnSurface:
     """Return the finer surface if enough of its frames fit into the budget, else the coarser."""
-    surface = drawn_surface(mesh, quartered=True)
+    surface = drawn_surface(body, quartered=True)
     if len(frames_that_fit(n_steps, len(surface.nodes))) >= min(n_steps, _FEW_FRAMES):
         return surface
-    return drawn_surface(mesh, quartered=False)
+    return drawn_surface(body, quartered=False)
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.common.errors import InputError
+from turgor.mesh.files import meshio_name
 from turgor.mesh.mesh import Mesh
 from turgor.results.files import replacing
 from turgor.results.record import ARRAY_FIELDS, PLAIN_FIELDS, StepRecord
+from turgor.results.stored import in_space
 
 Row = dict[str, Any]
 """One row of ``history.csv``: column → number, truth value or ``None``."""
+
+Curves = dict[str, list[Row]]
+"""The curves of a state: title → rows."""
 
 _Content = TypeVar("_Content")
 _NAMED = ("regions", "surfaces", "markers", "curves")
@@ -48,12 +53,12 @@ def load_mesh(path: Path) -> Mesh:
     return _load(path, build)
 
 
-def save_record(path: Path, record: StepRecord, row: Row) -> None:
-    """Write a state exactly, together with its row of the history."""
+def save_record(path: Path, record: StepRecord, row: Row, curves: Curves) -> None:
+    """Write a state exactly, together with its row of the history and its curves."""
     plain = {name: getattr(record, name) for name in PLAIN_FIELDS}
     plain |= {name: dict(value) for name, value in plain.items() if isinstance(value, Mapping)}
     arrays = {name: np.asarray(getattr(record, name), dtype=np.float64) for name in ARRAY_FIELDS}
-    _save(path, {**arrays, "plain": _as_json(plain), "row": _as_json(row)})
+    _save(path, {**arrays, "plain": _as_json(plain), "row": _as_json(row), "curves": _as_json(curves)})
 
 
 def load_record(path: Path) -> StepRecord:
@@ -71,16 +76,24 @@ def load_row(path: Path) -> Row:
     return _load(path, lambda archive: _from_json(archive["row"]))
 
 
+def load_curves(path: Path) -> Curves:
+    """Read only the state's curves; raise InputError if the file is missing or damaged."""
+    return _load(path, lambda archive: _from_json(archive["curves"]))
+
+
 def save_vtu(path: Path, mesh: Mesh, record: StepRecord) -> None:
-    """Write a state for ParaView: curved tetrahedra, displacement, von Mises stress, mean pressure, region number."""
+    """Write a state for ParaView: curved cells, displacement, von Mises stress, mean pressure, region number.
+
+    A plane section lies in the plane z = 0.
+    """
     region = np.zeros(mesh.n_cells, dtype=np.int32)
     for number, cells in enumerate(mesh.regions.values()):
         region[cells] = number
     grid = meshio.Mesh(
-        mesh.points,
-        [("tetra10", mesh.cells)],
+        in_space(mesh.points),
+        [(meshio_name(mesh.cells), mesh.cells)],
         point_data={
-            "displacement_mm": np.asarray(record.displacement, dtype=np.float32),
+            "displacement_mm": np.asarray(in_space(record.displacement), dtype=np.float32),
             "von_mises_MPa": np.asarray(record.von_mises, dtype=np.float32),
         },
         cell_data={

@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-_AZIMUTH, _ELEVATION = np.radians(28.0), np.radians(18.0)
+AZIMUTH, ELEVATION = float(np.radians(28.0)), float(np.radians(18.0))
+"""By how much the camera is turned and raised from the side of the motion."""
+
 _MARGIN = 1.08
 
 
@@ -38,19 +40,30 @@ class Camera:
     side: int
 
 
-def camera_for(points: FloatArray, aspect: float) -> Camera:
+def camera_for(points: FloatArray, aspect: float, side: int | None = None) -> Camera:
     """Return the camera that sees all `points` ``(n, 3)`` in a picture of width/height `aspect`.
 
-    It looks from the side at the plane of the motion, turned and raised a little so that depth shows. Up is z, or y
-    where z is the direction of least extent.
+    It looks from the side at the plane of the motion, turned and raised a little so that depth shows; straight at a
+    body that is flat. Up is z, or y where z is the direction it looks along.
+
+    Parameters
+    ----------
+    points
+        What is to be seen.
+    aspect
+        Width over height.
+    side
+        Coordinate axis to look along; left out, that of least extent.
     """
-    side = int(np.argmin(np.ptp(points, axis=0)))
+    extents = np.ptp(points, axis=0)
+    side = int(np.argmin(extents)) if side is None else side
+    azimuth, elevation = (AZIMUTH, ELEVATION) if extents[side] > 0.0 else (0.0, 0.0)
     vertical = np.eye(3)[1 if side == 2 else 2]
     # Looking along +y with z up (and along −x or −z alike) leaves the first in-plane axis pointing right.
     facing = np.eye(3)[side] * (-1.0 if side == 1 else 1.0)
     across = np.cross(vertical, facing)
-    level = np.cos(_AZIMUTH) * facing + np.sin(_AZIMUTH) * across
-    towards = np.cos(_ELEVATION) * level + np.sin(_ELEVATION) * vertical
+    level = np.cos(azimuth) * facing + np.sin(azimuth) * across
+    towards = np.cos(elevation) * level + np.sin(elevation) * vertical
     right = np.cross(vertical, towards)
     right /= np.linalg.norm(right)
     up = np.cross(towards, right)

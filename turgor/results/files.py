@@ -39,6 +39,25 @@ def write_text(path: Path, text: str) -> None:
         partial.write_text(text, encoding="utf-8", newline="")
 
 
+def read_text(path: Path) -> str:
+    """Read a UTF-8 text file; raise InputError if it is missing or damaged."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("the file is missing or damaged", file=path) from error
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON file that holds an object; raise InputError if it is missing or damaged."""
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise InputError(f"the file is damaged: {error}", file=path) from error
+    if not isinstance(content, dict):
+        raise InputError("the file is damaged", file=path, expected="a JSON object")
+    return content
+
+
 def json_text(content: Any) -> str:
     """Return plain data as strict JSON text, numbers that are not finite as ``null``."""
     return json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -4,39 +4,42 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from turgor.common.units import from_internal
-from turgor.mesh.mesh import Mesh
 from turgor.results.archive import Row
-from turgor.results.measures import evaluate, max_displacement
-from turgor.results.record import SOLVER_FACTS, StepRecord
+from turgor.results.measures import Choice, evaluate
+from turgor.results.measures.motion import max_displacement
+from turgor.results.record import SOLVER_FACTS
+from turgor.results.stored import StoredState
 
 PRESSURE_PREFIX = "pressure:"
 """A load ``pressure:<cavity>`` is the pressure in that cavity in MPa; other loads are dimensionless factors."""
 
 
-def row(record: StepRecord, mesh: Mesh, measures: Iterable[str]) -> Row:
+def row(state: StoredState, measures: Iterable[Choice]) -> Row:
     """Return the row of a step.
 
     ``pressure_kPa`` is the pressure of largest size and ``cavity_volume_mm3`` the volume of all cavities; where there
-    are several cavities each also has its own columns.
+    are several cavities each also has its own columns. How each contact and each fibre stands has columns of its own. A
+    measure that is not a number in this state is ``None``.
 
     Parameters
     ----------
-    record
+    state
         The step.
-    mesh
-        Its mesh.
     measures
-        Names of the measures to include.
+        The measures to include.
 
     Raises
     ------
     InputError
-        If a measure is unknown or the mesh lacks what it needs.
+        If the body lacks what a measure needs.
     """
-    motion = evaluate(measures, mesh, record.displacement)
+    record = state.record
+    numbers = evaluate(measures, state)
     return {
         "step": record.index,
         "fraction": float(record.fraction),
@@ -45,7 +48,9 @@ def row(record: StepRecord, mesh: Mesh, measures: Iterable[str]) -> Row:
         "max_von_mises_MPa": float(record.von_mises_max),
         "von_mises_p99_MPa": float(record.von_mises_p99),
         **_volumes(record.cavity_volumes),
-        **motion,
+        **{key: number if math.isfinite(number) else None for key, number in numbers.items()},
+        **_contacts(record.standing.get("contact", {})),
+        **_fibres(record.standing.get("fibres", {})),
         **{fact: record.solver[fact] for fact in SOLVER_FACTS},
     }
 
@@ -77,6 +82,33 @@ def _volumes(volumes: Mapping[str, float]) -> Row:
     columns: Row = {"cavity_volume_mm3": float(sum(volumes.values()))} if volumes else {}
     if len(volumes) > 1:
         columns |= {f"volume_{name}_mm3": float(value) for name, value in volumes.items()}
+    return columns
+
+
+def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
+    """Area, overlap and force of each contact; of the force on a rigid body also its size."""
+    columns: Row = {}
+    for name, facts in standing.items():
+        for key, value in facts.items():
+            if isinstance(value, (list, tuple)):
+                quantity, unit = key.split("_", 1)
+                parts = {
+                    f"contact_{name}_{quantity}_{axis}_{unit}": float(x) for axis, x in zip("xyz", value, strict=True)
+                }
+                columns |= {**parts, f"contact_{name}_{key}": math.hypot(*value)} if quantity == "force" else parts
+            elif value is not None:
+                columns[f"contact_{name}_{key}"] = float(value)
+    return columns
+
+
+def _fibres(standing: Mapping[str, Mapping[str, Any]]) -> Row:
+    """The largest tension and strain of all fibres and, where there are several, of each."""
+    columns: Row = {}
+    for key in next(iter(standing.values()), {}):
+        columns[f"fibre_{key}"] = max(float(facts[key]) for facts in standing.values())
+    if len(standing) > 1:
+        for name, facts in standing.items():
+            columns |= {f"fibre_{name}_{key}": float(value) for key, value in facts.items()}
     return columns
 
 

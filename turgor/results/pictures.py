@@ -13,15 +13,16 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from turgor.common.errors import MissingPackageError
 from turgor.common.optional import is_available, library_advice
-from turgor.mesh.mesh import Mesh
 from turgor.results.camera import camera_for
+from turgor.results.drawing import CUT_SIDE, drawing_of
 from turgor.results.record import StepRecord
-from turgor.results.skin import compact, outside_faces
+from turgor.results.stored import Body
 
 SIZE = (960, 720)
 """Width and height of a picture in pixels."""
@@ -35,19 +36,22 @@ _GRAPHICS_ADVICE = (
 
 @dataclass(frozen=True)
 class Pictures:
-    """PNG files as bytes: the whole body in each state, and the last state cut open along its side plane."""
+    """PNG files as bytes: the whole body in each state, and the last state cut open along its side plane.
+
+    A plane section has nothing to cut, and a body of revolution is drawn cut open in every state.
+    """
 
     states: tuple[bytes, ...]
-    section: bytes
+    section: bytes | None
 
 
-def draw(mesh: Mesh, records: Sequence[StepRecord], labels: Sequence[str], scale_max: float) -> Pictures:
+def draw(body: Body, records: Sequence[StepRecord], labels: Sequence[str], scale_max: float) -> Pictures:
     """Draw some states with one camera and one colour scale, so that the pictures can be compared.
 
     Parameters
     ----------
-    mesh
-        The mesh of the run.
+    body
+        The body of the run.
     records
         The states to draw, at least one.
     labels
@@ -62,36 +66,37 @@ def draw(mesh: Mesh, records: Sequence[StepRecord], labels: Sequence[str], scale
     """
     if not is_available("pyvista"):
         raise MissingPackageError("pictures need the package 'pyvista': pip install pyvista")
-    faces = outside_faces(mesh)
-    nodes, compacted = compact(faces)
-    displacements = np.array([record.displacement for record in records])
-    seen = [mesh.points[nodes], *(mesh.points + displacements)[:, nodes]]
-    camera = camera_for(np.concatenate(seen), SIZE[0] / SIZE[1])
+    drawing, mesh = drawing_of(body), body.mesh
+    positions = [mesh.points, *(mesh.points + record.displacement for record in records)]
+    places = np.array([drawing.places(here) for here in positions])
+    camera = camera_for(np.concatenate(places), SIZE[0] / SIZE[1], CUT_SIDE if body.kind == "axisymmetric" else None)
+    arrays: dict[str, Any] = {
+        "places": places,
+        "faces": drawing.faces,
+        "von_mises": np.array([record.von_mises[drawing.source] for record in records]),
+        "target": camera.target,
+        "towards": camera.towards,
+        "up": camera.up,
+    }
+    if body.kind == "space":
+        last = records[-1]
+        arrays |= {"points": mesh.points, "moved": mesh.points + last.displacement, "cells": mesh.cells}
+        arrays |= {"nodal": last.von_mises}
+    scene = {
+        "labels": list(labels),
+        "scale_max": scale_max,
+        "size": SIZE,
+        "half_height": camera.half_height,
+        "side": camera.side,
+    }
     with tempfile.TemporaryDirectory(prefix="turgor-") as name:
         folder = Path(name)
-        np.savez(
-            folder / "job.npz",
-            points=mesh.points,
-            cells=mesh.cells,
-            nodes=nodes,
-            faces=compacted,
-            displacements=displacements,
-            von_mises=np.array([record.von_mises for record in records]),
-            target=camera.target,
-            towards=camera.towards,
-            up=camera.up,
-        )
-        scene = {
-            "labels": list(labels),
-            "scale_max": scale_max,
-            "size": SIZE,
-            "half_height": camera.half_height,
-            "side": camera.side,
-        }
+        np.savez(folder / "job.npz", **arrays)
         (folder / "job.json").write_text(json.dumps(scene), encoding="utf-8")
         _render(folder)
         states = tuple((folder / f"state-{k}.png").read_bytes() for k in range(len(records)))
-        return Pictures(states, (folder / "section.png").read_bytes())
+        section = folder / "section.png"
+        return Pictures(states, section.read_bytes() if section.exists() else None)
 
 
 def _render(folder: Path) -> None:

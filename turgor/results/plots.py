@@ -36,6 +36,7 @@ MOTION = (
     Quantity("twist_deg", "Twist / °"),
     Quantity("elongation_mm", "Elongation / mm"),
     Quantity("max_displacement_mm", "Largest displacement / mm"),
+    Quantity("tip_force_N", "Tip force / N"),
     Quantity("cavity_volume_mm3", "Cavity volume / mm³"),
     Quantity("max_von_mises_MPa", "Largest von Mises / MPa"),
 )
@@ -76,7 +77,7 @@ def load_motion(history: Sequence[Row]) -> go.Figure:
             figure.add_trace(trace, row=row + 1, col=column + 1)
         figure.update_xaxes(title_text=load.title, row=row + 1, col=column + 1)
         figure.update_yaxes(title_text=quantity.title, row=row + 1, col=column + 1)
-    _finish(figure, height=320 * rows)
+    finish(figure, height=320 * rows)
     if _TIP in shown:
         row, column = divmod(shown.index(_TIP), columns)
         corner = figure.get_subplot(row + 1, column + 1)
@@ -111,16 +112,17 @@ def _traces(quantity: Quantity, loads: Sequence[float], history: Sequence[Row]) 
     symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]
     if quantity != _TIP:
         values = [entry[quantity.key] for entry in history]
-        return [_line(loads, values, symbols, ACCENT, name=quantity.title, legend=False)]
+        return [line_trace(loads, values, symbols, ACCENT, name=quantity.title, legend=False)]
     return [
-        _line(loads, [entry[key] for entry in history], symbols, color, name=f"tip, {axis}", legend=True)
+        line_trace(loads, [entry[key] for entry in history], symbols, color, name=f"tip, {axis}", legend=True)
         for (axis, key), color in zip(_COMPONENTS, SERIES, strict=False)
     ]
 
 
-def _line(
-    x: Sequence[float], y: Sequence[float], symbols: Sequence[str], color: str, *, name: str, legend: bool
+def line_trace(
+    x: Sequence[float], y: Sequence[float | None], symbols: Sequence[str], color: str, *, name: str, legend: bool
 ) -> go.Scatter:
+    """Return a line with a marker at each state."""
     return go.Scatter(
         x=list(x),
         y=list(y),
@@ -169,7 +171,7 @@ def stress_strain(fit: Mapping[str, Any]) -> go.Figure:
         )
     figure.update_xaxes(title_text="Nominal strain")
     figure.update_yaxes(title_text="Nominal stress / MPa")
-    _finish(figure, height=420)
+    finish(figure, height=420)
     return figure
 
 
@@ -220,12 +222,13 @@ def body_scene(low: FloatArray, high: FloatArray, camera: Camera, scale_max: flo
     }
     figure = go.Figure(body)
     figure.update_layout(scene=scene)
-    _finish(figure, height=560)
+    finish(figure, height=560)
     figure.update_layout(margin={"l": 0, "r": 0, "t": 0, "b": 0})
     return figure
 
 
-def _finish(figure: go.Figure, height: int) -> None:
+def finish(figure: go.Figure, height: int) -> None:
+    """Give a figure its height, fonts and axes."""
     figure.update_layout(
         template="plotly_white",
         height=height,

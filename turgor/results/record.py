@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ SOLVER_FACTS = ("iterations", "factorisations", "stable", "residual", "wall_s")
 
 @dataclass(frozen=True, eq=False)
 class StepRecord:
-    """An equilibrium state of n nodes and m elements, and how the solver reached it.
+    """An equilibrium state of n nodes in d dimensions and m elements, and how the solver reached it.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class StepRecord:
     loads
         Value of every load: ``{"pressure:cavity": 0.03}`` in MPa, dimensionless factors under their own name.
     displacement
-        Shape ``(n, 3)``, mm.
+        Shape ``(n, d)``, mm.
     element_pressure
         Mean pressure of each element, shape ``(m,)``, MPa.
     element_dilatation
@@ -44,6 +44,9 @@ class StepRecord:
         Enclosed volume of each cavity, mm³.
     solver
         The :data:`SOLVER_FACTS` of the step; ``stable`` is ``None`` where the solver cannot tell.
+    standing
+        How contacts (``contact``), fibres (``fibres``) and the interfaces of two materials (``interfaces``) stand, by
+        their names, in plain values with keys that end in their unit; only what the body has.
     """
 
     index: int
@@ -57,11 +60,17 @@ class StepRecord:
     von_mises_p99: float
     cavity_volumes: Mapping[str, float]
     solver: Mapping[str, Any]
+    standing: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
 
     def check(self, mesh: Mesh) -> None:
         """Raise InputError unless the arrays have the shapes that `mesh` asks for."""
         n, m = mesh.n_points, mesh.n_cells
-        shapes = {"displacement": (n, 3), "element_pressure": (m,), "element_dilatation": (m,), "von_mises": (n,)}
+        shapes = {
+            "displacement": (n, mesh.dimension),
+            "element_pressure": (m,),
+            "element_dilatation": (m,),
+            "von_mises": (n,),
+        }
         for name, shape in shapes.items():
             found = np.shape(getattr(self, name))
             if found != shape:
@@ -72,5 +81,5 @@ class StepRecord:
 
 
 ARRAY_FIELDS = ("displacement", "element_pressure", "element_dilatation", "von_mises")
-PLAIN_FIELDS = tuple(field.name for field in fields(StepRecord) if field.name not in ARRAY_FIELDS)
+PLAIN_FIELDS = tuple(entry.name for entry in fields(StepRecord) if entry.name not in ARRAY_FIELDS)
 """The fields of a record that JSON can hold; the others are arrays."""

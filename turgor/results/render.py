@@ -24,10 +24,11 @@ _SUBDIVISIONS = 2
 _BAR_PART, _LABEL_PART = 0.16, 0.09
 """Parts of the picture's height that belong to the colour bar below and to the label above."""
 _EDGE_ANGLE_DEG = 35.0
+_CELLS = {10: pyvista.CellType.QUADRATIC_TETRA, 27: pyvista.CellType.TRIQUADRATIC_HEXAHEDRON}
 
 
 def main(folder: Path) -> None:
-    """Draw the job in `folder`: ``state-0.png``, ``state-1.png``, … and ``section.png``."""
+    """Draw the job in `folder`: ``state-0.png``, ``state-1.png``, … and of a body in space ``section.png``."""
     # Without a screen VTK falls back to EGL by itself, but warns on the way about the X server it did not find.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     vtkObject.GlobalWarningDisplayOff()
@@ -38,31 +39,28 @@ def main(folder: Path) -> None:
     for state, label in enumerate(scene["labels"]):
         body = _skin(arrays, state)
         _save(folder / f"state-{state}.png", body, outline, label, scene, arrays)
-    last = len(scene["labels"]) - 1
-    section = _section(arrays, last, scene["side"])
-    _save(folder / "section.png", section, None, f"{scene['labels'][last]}, cut open", scene, arrays)
+    if "cells" in arrays:
+        label = f"{scene['labels'][-1]}, cut open"
+        _save(folder / "section.png", _section(arrays, scene["side"]), None, label, scene, arrays)
 
 
 def _skin(arrays: dict[str, npt.NDArray[Any]], state: int | None) -> Any:
-    """The outside of the body in one state, or at rest (None), its curved faces cut into small flat ones."""
-    nodes = arrays["nodes"]
-    points = arrays["points"][nodes]
+    """What is drawn of the body in one state, or at rest (None), its curved faces cut into small flat ones."""
+    places = arrays["places"][0 if state is None else state + 1]
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TRIANGLE: arrays["faces"]}, places)
     if state is not None:
-        points = points + arrays["displacements"][state, nodes]
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TRIANGLE: arrays["faces"]}, points)
-    if state is not None:
-        grid.point_data[_STRESS] = arrays["von_mises"][state, nodes]
+        grid.point_data[_STRESS] = arrays["von_mises"][state]
     return _smooth(grid)
 
 
-def _section(arrays: dict[str, npt.NDArray[Any]], state: int, side: int) -> Any:
-    """The half of the body behind the plane that halves its extent along the coordinate `side` at rest."""
+def _section(arrays: dict[str, npt.NDArray[Any]], side: int) -> Any:
+    """The half of the last state behind the plane that halves the body's extent along the coordinate `side` at rest."""
     reference = arrays["points"][:, side]
     across = reference - 0.5 * (reference.min() + reference.max())
     behind = across * -np.sign(arrays["towards"][side])
-    points = arrays["points"] + arrays["displacements"][state]
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: arrays["cells"]}, points)
-    grid.point_data[_STRESS] = arrays["von_mises"][state]
+    kind = _CELLS[arrays["cells"].shape[1]]
+    grid = pyvista.UnstructuredGrid({kind: arrays["cells"]}, arrays["moved"])
+    grid.point_data[_STRESS] = arrays["nodal"]
     grid.point_data[_REFERENCE] = behind
     return _smooth(grid.clip_scalar(scalars=_REFERENCE, value=0.0, invert=False))
 

@@ -16,15 +16,16 @@ import yaml
 from plotly.offline import get_plotlyjs
 
 from turgor.common.errors import MissingPackageError
-from turgor.mesh.mesh import Mesh
-from turgor.results import animation, plots
+from turgor.results import animation, curve_plots, plots
 from turgor.results.archive import Row
 from turgor.results.camera import camera_for
+from turgor.results.drawing import CUT_SIDE
 from turgor.results.files import write_text
-from turgor.results.measures import cavity_volume, evaluate
+from turgor.results.measures import evaluate
 from turgor.results.pictures import draw
 from turgor.results.record import StepRecord
 from turgor.results.store import RunStore
+from turgor.results.stored import Body
 
 FILE_NAME = "report.html"
 
@@ -37,6 +38,7 @@ _HEADLINES = (
     ("bending_angle_deg", "Bending angle", "°"),
     ("tip_displacement_mm", "Tip displacement", "mm"),
     ("max_displacement_mm", "Largest displacement", "mm"),
+    ("tip_force_N", "Tip force", "N"),
     ("max_von_mises_MPa", "Largest von Mises stress", "MPa"),
     ("cavity_volume_mm3", "Cavity volume", "mm³"),
 )
@@ -77,7 +79,7 @@ def report(folder: str | Path) -> Path:
         "plotly_js": get_plotlyjs(),
         "fit": _fit_section(store.fit),
         "history": store.history,
-        "mesh": _mesh_facts(store.mesh),
+        "mesh": _mesh_facts(store.body),
     }
     if store.n_steps:
         content |= _states_section(store)
@@ -120,27 +122,39 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     mesh, history = store.mesh, store.history
     load = plots.load_axis(history)
     scale_max = _round_up(max(entry["von_mises_p99_MPa"] for entry in history))
-    surface = animation.surface_that_fits(mesh, store.n_steps)
+    surface = animation.surface_that_fits(store.body, store.n_steps)
     shown = animation.frames_that_fit(store.n_steps, len(surface.nodes))
     records = [store.load(index) for index in shown]
-    nodes = surface.nodes
-    rest = mesh.points[nodes]
-    positions = [rest, *(rest + record.displacement[nodes] for record in records)]
-    stresses = [np.zeros(len(nodes)), *(record.von_mises[nodes] for record in records)]
+    positions = [
+        surface.places(mesh.points + u) for u in (np.zeros_like(mesh.points), *(r.displacement for r in records))
+    ]
+    stresses = [np.zeros(len(surface.nodes)), *(surface.values(record.von_mises) for record in records)]
     labels = ["at rest", *(_frame_label(history, index, load) for index in shown)]
     box = animation.bounds(positions)
-    camera = camera_for(np.concatenate(positions), _SCENE_ASPECT)
+    side = CUT_SIDE if store.body.kind == "axisymmetric" else None
+    camera = camera_for(np.concatenate(positions), _SCENE_ASPECT, side)
     pictures, note = _pictures(store, history, load, scale_max)
     curve = [_rest_row(store, history[0]), *history] if history[0]["fraction"] > 0.0 else history
     return {
         "cards": _cards(history),
         "motion": _as_json(plots.load_motion(curve)),
+        "extra": _extra_figures(store, curve),
         "scene": _as_json(plots.body_scene(box.low, box.high, camera, scale_max)),
         "frames": animation.pack(surface, positions, stresses, labels, box, scale_max),
         "load_title": load.title.split(" / ")[0],
         "pictures": pictures,
         "pictures_note": note,
     }
+
+
+def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, str]]:
+    """Figures that only some runs have: what contact and fibres carry, and the measures that are curves."""
+    figures = [(title, curve_plots.over_load(history, keys)) for title, keys in curve_plots.groups(history).items()]
+    figures += [(title.replace("-", " ").capitalize(), curve_plots.line(rows)) for title, rows in store.curves.items()]
+    return [
+        {"id": f"extra-{number}", "title": title, "figure": _as_json(figure)}
+        for number, (title, figure) in enumerate(figures)
+    ]
 
 
 def _as_json(figure: go.Figure) -> str:
@@ -173,10 +187,10 @@ def _cards(history: Sequence[Row]) -> list[Card]:
 def _rest_row(store: RunStore, first: Row) -> Row:
     """The row of the body at rest, so that the curves begin where the motion does."""
     rest = np.zeros_like(store.mesh.points)
-    volumes = [cavity_volume(store.mesh, rest, name) for name in store.load(0).cavity_volumes]
+    volumes = [store.body.enclosed_volume(name, rest) for name in store.load(0).cavity_volumes]
     zeros = {key: 0.0 for key, value in first.items() if isinstance(value, float)}
     volume = {"cavity_volume_mm3": sum(volumes)} if volumes else {}
-    return {**zeros, **volume, **evaluate(store.measures, store.mesh, rest), "stable": True}
+    return {**zeros, **volume, **evaluate(store.measures, store.body.at_rest()), "stable": True}
 
 
 def _pictures(
@@ -187,11 +201,13 @@ def _pictures(
     records: list[StepRecord] = [store.load(index) for index in indices]
     labels = [_load_label(history[index], load) for index in indices]
     try:
-        drawn = draw(store.mesh, records, labels, scale_max)
+        drawn = draw(store.body, records, labels, scale_max)
     except MissingPackageError as error:
         return [], str(error)
-    captions = [*labels, f"{labels[-1]}, cut open"]
-    files = [*drawn.states, drawn.section]
+    captions, files = list(labels), list(drawn.states)
+    if drawn.section is not None:
+        captions.append(f"{labels[-1]}, cut open")
+        files.append(drawn.section)
     return [Picture(text, _data_address(file)) for text, file in zip(captions, files, strict=True)], None
 
 
@@ -199,11 +215,27 @@ def _data_address(png: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 
-def _mesh_facts(mesh: Mesh) -> dict[str, Any]:
+_MODELS = {
+    "plane-strain": "plane strain, {thickness:g} mm thick",
+    "plane-stress": "plane stress, {thickness:g} mm thick",
+    "axisymmetric": "turned about the y axis",
+}
+_CELLS = {
+    "tet10": "ten-node tetrahedra",
+    "hex27": "27-node hexahedra",
+    "tri6": "six-node triangles",
+    "quad9": "nine-node quadrilaterals",
+}
+
+
+def _mesh_facts(body: Body) -> dict[str, Any]:
+    mesh, section = body.mesh, body.section
+    model = {} if section is None else {"Model": _MODELS[section.kind].format(thickness=section.thickness or 1.0)}
     return {
-        "Elements": f"{mesh.n_cells} ten-node tetrahedra",
+        **model,
+        "Elements": f"{mesh.n_cells} {_CELLS[mesh.cell_type]}",
         "Nodes": mesh.n_points,
-        "Volume / mm³": mesh.volume(),
+        **({"Volume / mm³": mesh.volume()} if section is None else {"Area / mm²": mesh.volume()}),
         "Regions": ", ".join(mesh.regions),
         "Surfaces": ", ".join(mesh.surfaces) or "–",
         "Markers": ", ".join(mesh.markers) or "–",

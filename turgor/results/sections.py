@@ -18,6 +18,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from turgor.mesh.mesh import Mesh
+from turgor.results.stored import in_space
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
     mesh
         With the surfaces ``mount`` and ``tip-face``.
     displacement
-        Shape ``(n, 3)``, mm.
+        Shape ``(n, d)``, mm.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def seen_from_mount(mesh: Mesh, displacement: FloatArray, vector: FloatArray) ->
     """Return `vector` ``(3,)`` as it looks to someone who turns with the mount."""
     nodes = mesh.surface_nodes(MOUNT)
     rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
-    assert rotation is not None, "a surface never lies on a line"
+    assert rotation is not None, "in space a surface never lies on a line"
     return np.asarray(rotation.T @ vector)
 
 
@@ -108,8 +109,8 @@ def _fitted_slices(mesh: Mesh, displacement: FloatArray) -> tuple[Rotation, Floa
         rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
         if rotation is not None:
             rotations.append(rotation)
-            before.append(mesh.points[nodes].mean(axis=0))
-            after.append(before[-1] + displacement[nodes].mean(axis=0))
+            before.append(in_space(mesh.points[nodes].mean(axis=0)))
+            after.append(before[-1] + in_space(displacement[nodes].mean(axis=0)))
     return Rotation.from_matrix(np.array(rotations)), np.array(before), np.array(after)
 
 
@@ -134,18 +135,24 @@ def _axis(mesh: Mesh) -> FloatArray:
     """Unit vector along the reference line where it reaches the tip face."""
     line = _reference_line(mesh)
     direction = line[-1] - line[-2]
-    return np.asarray(direction / np.linalg.norm(direction))
+    return np.asarray(in_space(direction / np.linalg.norm(direction)))
 
 
 def _best_rotation(points: FloatArray, displacement: FloatArray) -> FloatArray | None:
-    """Least-squares rotation of `points` to their displaced places; None where they lie on a line."""
-    if len(points) < 3:
+    """Least-squares rotation ``(3, 3)`` of `points` ``(k, d)`` to their displaced places; None where nothing fixes it.
+
+    In space points on a line leave it open, in the plane two points tell it.
+    """
+    d = points.shape[1]
+    if len(points) < d:
         return None
     before = points - points.mean(axis=0)
     after = before + displacement - displacement.mean(axis=0)
     spread = np.linalg.svd(before, compute_uv=False)
-    if spread[1] < 1e-3 * spread[0]:
+    if spread[d - 2] < 1e-3 * spread[0] or spread[0] == 0.0:
         return None
     left, _, right = np.linalg.svd(after.T @ before)
-    left[:, 2] *= np.linalg.det(left @ right)
-    return np.asarray(left @ right)
+    left[:, -1] *= np.linalg.det(left @ right)
+    rotation = np.eye(3)
+    rotation[:d, :d] = left @ right
+    return rotation

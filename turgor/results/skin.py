@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from turgor.mesh.cells import face_cell
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
@@ -22,9 +23,12 @@ _SHARP_COSINE = float(np.cos(np.radians(40.0)))
 
 _CORNERS = np.array([[0, 1, 2]])
 
+_HALVES = np.array([[0, 1, 2, 4, 5, 8], [0, 2, 3, 8, 6, 7]])
+"""The two six-node triangles of a nine-node quadrilateral, its centre in the middle of their common side."""
+
 
 def outside_faces(mesh: Mesh) -> IntArray:
-    """Return the six-node boundary faces that do not look into a cavity, shape ``(k, 6)``.
+    """Return the boundary faces that do not look into a cavity, shape ``(k, nodes_per_face)``.
 
     A body whose every face belongs to a cavity is returned whole.
     """
@@ -35,6 +39,11 @@ def outside_faces(mesh: Mesh) -> IntArray:
     inside = np.unique(_keys(np.concatenate(hidden), mesh.n_points))
     visible = ~np.isin(_keys(faces, mesh.n_points), inside)
     return faces[visible] if visible.any() else faces
+
+
+def six_node_triangles(faces: IntArray) -> IntArray:
+    """Return faces as six-node triangles ``(j, 6)``: themselves, or two for each nine-node quadrilateral."""
+    return faces if faces.shape[1] == 6 else np.asarray(faces[:, _HALVES].reshape(-1, 6))
 
 
 def flat_triangles(faces: IntArray, *, quartered: bool) -> IntArray:
@@ -75,7 +84,7 @@ def smooth_patches(points: npt.NDArray[np.float64], faces: IntArray) -> npt.NDAr
 
 
 def _keys(faces: IntArray, n_points: int) -> npt.NDArray[np.int64]:
-    """One number for each triangle, the same whatever the order of its corners."""
-    corners = np.sort(faces[:, :3].astype(np.int64), axis=1)
+    """One number for each face, the same whatever the order of its corners; three corners tell which it is."""
+    corners = np.sort(faces[:, : face_cell(faces).n_corners].astype(np.int64), axis=1)
     keys: npt.NDArray[np.int64] = (corners[:, 0] * n_points + corners[:, 1]) * n_points + corners[:, 2]
     return keys

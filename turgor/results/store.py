@@ -1,14 +1,16 @@
 """The folder of a run: every step is on the disk, whole, before the next one begins.
 
 =====================  ==============================================================================================
-``store.json``         version of this layout and the names of the run's measures; it makes the folder a run's folder
+``store.json``         version of this layout, the measures, what a plane mesh stands for, the rigid bodies there are;
+                       it makes the folder a run's folder
 ``case.yaml``          the resolved case
 ``mesh.npz``           the mesh with all its names
-``steps/0003.npz``     exact state of step 3 and its row of the history; written last, so that its presence means the
-                       step is complete
+``steps/0003.npz``     exact state of step 3, its row of the history and its curves; written last, so that its presence
+                       means the step is complete
 ``steps/0003.vtu``     the same for ParaView
 ``result.pvd``         list of the ``.vtu`` files over the load parameter
 ``history.csv``        one row a step
+``curves/NAME.csv``    a measure that is a curve: its rows of all steps
 ``summary.json``       what came out, once the run has ended
 ``fit.json``           the fit of the material, if the run made one
 =====================  ==============================================================================================
@@ -16,9 +18,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self
 from xml.sax.saxutils import quoteattr
@@ -26,30 +28,49 @@ from xml.sax.saxutils import quoteattr
 import yaml
 
 from turgor.common.errors import InputError
+from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.results import measures as known_measures
-from turgor.results.archive import Row, load_mesh, load_record, load_row, save_mesh, save_record, save_vtu
-from turgor.results.files import PARTIAL, FolderLock, json_text, write_text
+from turgor.results.archive import (
+    Curves,
+    Row,
+    load_curves,
+    load_mesh,
+    load_record,
+    load_row,
+    save_mesh,
+    save_record,
+    save_vtu,
+)
+from turgor.results.files import PARTIAL, FolderLock, json_text, read_json, read_text, write_text
 from turgor.results.history import as_csv, row
+from turgor.results.measures import Choice
 from turgor.results.record import StepRecord
+from turgor.results.stored import Body, StoredState
 from turgor.results.summary import as_json
 
 LAYOUT = 1
 """Version of the layout of the folder."""
 
+_OF_LOAD = ("step", "fraction", "pressure_kPa")
+"""Columns of the history that a curve repeats."""
+
 _STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
-_PVD, _HISTORY, _SUMMARY, _FIT = "result.pvd", "history.csv", "summary.json", "fit.json"
+_PVD, _HISTORY, _SUMMARY, _FIT, _CURVES = "result.pvd", "history.csv", "summary.json", "fit.json", "curves"
 
 
 class RunStore:
     """The stored states of one run; made by :meth:`create`, :meth:`resume` (to add steps) or :meth:`open` (to read)."""
 
-    def __init__(self, folder: Path, mesh: Mesh, measures: tuple[str, ...], lock: FolderLock | None) -> None:
+    def __init__(self, folder: Path, body: Body, measures: tuple[Choice, ...], lock: FolderLock | None) -> None:
         self.folder = folder
-        self.mesh = mesh
+        self.body = body
         self.measures = measures
         self._lock = lock
-        self._rows = [load_row(self._step_file(index)) for index in range(_finished_steps(folder))]
+        finished = range(_finished_steps(folder))
+        self._rows = [load_row(self._step_file(index)) for index in finished]
+        has_curves = any(choice.entry.is_curve for choice in measures)
+        self._curves = [load_curves(self._step_file(index)) for index in finished] if has_curves else []
 
     @classmethod
     def create(
@@ -58,7 +79,10 @@ class RunStore:
         mesh: Mesh,
         case: Mapping[str, Any] | str,
         *,
-        measures: Iterable[str] | None = None,
+        measures: Iterable[Choice | str] | None = None,
+        section: PlaneSection | None = None,
+        rigid_bodies: Iterable[str] = (),
+        files: Mapping[Path, str] | None = None,
         overwrite: bool = False,
     ) -> Self:
         """Begin a run in a folder, which is made if need be.
@@ -72,7 +96,13 @@ class RunStore:
         case
             The resolved case, as YAML text or as plain data.
         measures
-            Names of the measures of the history; left out, all that the mesh has the names for.
+            The measures of the history; left out, the usual ones that the mesh has the names for.
+        section
+            What a plane mesh stands for.
+        rigid_bodies
+            Names of the rigid bodies that the actuator may meet.
+        files
+            Data file of a measure → name of its copy in the folder.
         overwrite
             Replace the run that is in the folder.
 
@@ -83,8 +113,9 @@ class RunStore:
             unknown or impossible on this mesh.
         """
         place = Path(folder)
-        chosen = known_measures.available(mesh) if measures is None else tuple(measures)
-        known_measures.check(chosen, mesh)
+        body = Body(mesh, section, tuple(rigid_bodies))
+        chosen = known_measures.available(body) if measures is None else tuple(map(Choice.read, measures))
+        known_measures.check(chosen, body)
         if (place / _STORE).exists() and not overwrite:
             raise InputError(
                 "the folder holds a run already",
@@ -100,8 +131,10 @@ class RunStore:
         text = case if isinstance(case, str) else yaml.safe_dump(dict(case), sort_keys=False, allow_unicode=True)
         write_text(place / _CASE, text)
         save_mesh(place / _MESH, mesh)
-        write_text(place / _STORE, json_text({"layout": LAYOUT, "measures": chosen}))
-        store = cls(place, mesh, chosen, lock)
+        content: dict[str, Any] = {"layout": LAYOUT, "measures": [choice.plain(files) for choice in chosen]}
+        content |= {"section": None if section is None else asdict(section), "rigid_bodies": body.rigid_bodies}
+        write_text(place / _STORE, json_text(content))
+        store = cls(place, body, chosen, lock)
         store._write_tables()
         return store
 
@@ -149,11 +182,14 @@ class RunStore:
             raise InputError(
                 "this is not the next step", key="index", value=record.index, expected=str(len(self._rows))
             )
-        entry = row(record, self.mesh, self.measures)
+        state = StoredState(self.body, record)
+        entry, curves = row(state, self.measures), known_measures.tables(self.measures, state)
         path = self._step_file(record.index)
         save_vtu(path.with_suffix(".vtu"), self.mesh, record)
-        save_record(path, record, entry)
+        save_record(path, record, entry, curves)
         self._rows.append(entry)
+        if curves:
+            self._curves.append(curves)
         self._write_tables()
 
     def finish(self, summary: Mapping[str, Any]) -> None:
@@ -180,6 +216,11 @@ class RunStore:
         write_text(self.folder / _FIT, json_text(fit))
 
     @property
+    def mesh(self) -> Mesh:
+        """The mesh of the run."""
+        return self.body.mesh
+
+    @property
     def n_steps(self) -> int:
         """Number of finished steps."""
         return len(self._rows)
@@ -190,19 +231,32 @@ class RunStore:
         return [dict(entry) for entry in self._rows]
 
     @property
+    def curves(self) -> Curves:
+        """The rows of each curve of all steps, by its title; each begins with the step and its load."""
+        titles = self._curves[0] if self._curves else {}
+        return {
+            title: [
+                {**{key: entry[key] for key in _OF_LOAD if key in entry}, "station": number, **place}
+                for entry, curves in zip(self._rows, self._curves, strict=True)
+                for number, place in enumerate(curves[title], start=1)
+            ]
+            for title in titles
+        }
+
+    @property
     def case_text(self) -> str:
         """The resolved case as YAML text."""
-        return _read_text(self.folder / _CASE)
+        return read_text(self.folder / _CASE)
 
     @property
     def summary(self) -> dict[str, Any] | None:
         """The summary, or None while the run has not ended."""
-        return _read_json(self.folder / _SUMMARY) if (self.folder / _SUMMARY).exists() else None
+        return read_json(self.folder / _SUMMARY) if (self.folder / _SUMMARY).exists() else None
 
     @property
     def fit(self) -> dict[str, Any] | None:
         """The fit of the material, or None if the run has none."""
-        return _read_json(self.folder / _FIT) if (self.folder / _FIT).exists() else None
+        return read_json(self.folder / _FIT) if (self.folder / _FIT).exists() else None
 
     def load(self, index: int) -> StepRecord:
         """Read one step; raise InputError if there is none of that number or its file is damaged."""
@@ -231,6 +285,9 @@ class RunStore:
 
     def _write_tables(self) -> None:
         write_text(self.folder / _HISTORY, as_csv(self._rows))
+        for title, rows in self.curves.items():
+            (self.folder / _CURVES).mkdir(exist_ok=True)
+            write_text(self.folder / _CURVES / f"{title}.csv", as_csv(rows))
         sets = "".join(
             f'    <DataSet timestep="{entry["fraction"]!r}" file={quoteattr(f"{_STEPS}/{index:04d}.vtu")}/>\n'
             for index, entry in enumerate(self._rows)
@@ -261,43 +318,34 @@ def _finished_steps(folder: Path) -> int:
     return count
 
 
-def _read_store(folder: Path) -> tuple[Mesh, tuple[str, ...]]:
+def _read_store(folder: Path) -> tuple[Body, tuple[Choice, ...]]:
     if not (folder / _STORE).is_file():
         raise InputError(
             "the folder holds no run", file=folder, expected=f"a folder that 'turgor run' wrote ({_STORE})"
         )
-    content = _read_json(folder / _STORE)
+    content = read_json(folder / _STORE)
     if content.get("layout") != LAYOUT:
         raise InputError(
             "the run has another layout", file=folder / _STORE, value=content.get("layout"), expected=str(LAYOUT)
         )
-    mesh = load_mesh(folder / _MESH)
-    measures = tuple(content.get("measures", ()))
-    known_measures.check(measures, mesh)
-    return mesh, measures
-
-
-def _read_text(path: Path) -> str:
+    section = content.get("section")
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError("the file is missing or damaged", file=path) from error
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(_read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(f"the file is damaged: {error}", file=path) from error
-    if not isinstance(content, dict):
-        raise InputError("the file is damaged", file=path, expected="a JSON object")
-    return content
+        body = Body(
+            load_mesh(folder / _MESH),
+            None if section is None else PlaneSection(**section),
+            tuple(content.get("rigid_bodies", ())),
+        )
+        measures = tuple(Choice.read(value, folder) for value in content.get("measures", ()))
+    except TypeError as error:
+        raise InputError(f"the file is damaged: {error}", file=folder / _STORE) from error
+    known_measures.check(measures, body)
+    return body, measures
 
 
 def _remove_run(folder: Path) -> None:
     """Remove the files of an earlier run, the one that makes the folder a run's folder first."""
     for name in (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT):
         (folder / name).unlink(missing_ok=True)
-    for pattern in ("*.npz", "*.vtu", f"*{PARTIAL}"):
-        for path in (folder / _STEPS).glob(pattern):
+    for pattern in (f"{_STEPS}/*.npz", f"{_STEPS}/*.vtu", f"{_STEPS}/*{PARTIAL}", f"{_CURVES}/*.csv"):
+        for path in folder.glob(pattern):
             path.unlink()

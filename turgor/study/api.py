@@ -8,8 +8,12 @@ from typing import Any
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.fem.loads import Pressure
+from turgor.fem.section import check_section, section_of
+from turgor.geometry.section import PlaneSection
 from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
+from turgor.results.measures import Choice, available, check
+from turgor.results.stored import Body
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions, solve_path
 from turgor.study.build import every_region
@@ -33,6 +37,11 @@ class Model:
     contact
         ``True`` for contact of the actuator with itself; or what may touch what, as in a case file:
         ``{"bodies": [{"type": "plane", "point": …, "normal": …}]}``.
+    section
+        What a plane mesh stands for: the ``section`` of the shape that it was made of.
+    measures
+        What is to be known of each state, each as in a case file; left out, the usual ones that the mesh has the names
+        for.
     fibres, sheets, fibre_families
         What runs through the body or lies on it, each as in a case file.
     materials
@@ -41,7 +50,7 @@ class Model:
     Raises
     ------
     InputError
-        If a region, surface, cavity or curve is unknown, or a region has no material.
+        If a region, surface, cavity or curve is unknown, a region has no material, or a measure is impossible.
     """
 
     def __init__(
@@ -51,6 +60,8 @@ class Model:
         supports: Sequence[Mapping[str, Any]] | None = None,
         loads: Sequence[Mapping[str, Any]] = (),
         contact: bool | Mapping[str, Any] = False,
+        section: PlaneSection | None = None,
+        measures: Sequence[str | Mapping[str, Any]] | None = None,
         fibres: Sequence[Mapping[str, Any]] = (),
         sheets: Sequence[Mapping[str, Any]] = (),
         fibre_families: Sequence[Mapping[str, Any]] = (),
@@ -67,6 +78,10 @@ class Model:
             fibre_families=fibre_families,
         )
         self.setup.check(mesh)
+        check_section(mesh, section_of(section))
+        self.body = Body(mesh, section, tuple(self.setup.contact.labels) if self.setup.contact else ())
+        self.measures = available(self.body) if measures is None else tuple(map(Choice.read, measures))
+        check(self.measures, self.body)
 
     def inflate(
         self,
@@ -105,9 +120,9 @@ class Model:
         value = to_internal(pressure, "pressure", key="pressure")
         cavities = [cavity] if cavity else _cavities(self.mesh)
         pressures = [Pressure(name, value) for name in cavities]
-        system = self.setup.system(self.mesh, self.materials, pressures)
+        system = self.setup.system(self.mesh, self.materials, pressures, self.body.mechanics)
         recorder = Recorder(system)
-        path = Path(self.mesh, system.n_dofs, self._description())
+        path = Path(self.body, system.n_dofs, self._description(), self.measures)
 
         def keep(equilibrium: Equilibrium) -> None:
             nonlocal path

@@ -99,11 +99,12 @@ class GravityCase(StrictModel):
 
     type: Literal["gravity"]
     acceleration: Acceleration = 9806.65
-    direction: Direction = (0.0, 0.0, -1.0)
+    direction: Direction | None = Field(default=None, description="left out, down: −z, in a plane model −y")
 
-    def build(self) -> Gravity:
-        """Return the load."""
-        return Gravity(_along(self.direction, self.acceleration))
+    def build(self, dimension: int = 3) -> Gravity:
+        """Return the load on a model of 3 or 2 dimensions."""
+        down = (0.0, 0.0, -1.0) if dimension == 3 else (0.0, -1.0, 0.0)
+        return Gravity(_along(self.direction or down, self.acceleration))
 
 
 class TractionCase(StrictModel):

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_text
+from turgor.fem.section import section_of
 from turgor.fem.system import System
 from turgor.materials import Hyperelastic
 from turgor.materials.assessment import warnings_in_use
@@ -123,7 +124,7 @@ def check_names(case: Case, mesh: Mesh) -> None:
 
 def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> System:
     """Return the system of a case on its mesh; raise InputError as `every_region`, `check_names` or System do."""
-    return case.system(mesh, every_region(materials, mesh))
+    return case.system(mesh, every_region(materials, mesh), section=section_of(case.geometry.section))
 
 
 def _check_regions(names: Collection[str], mesh: Mesh) -> None:

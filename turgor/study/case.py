@@ -30,14 +30,14 @@ from turgor.common.units import PositiveLength, Pressure
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import templates
 from turgor.geometry.imported.step import StepFile
-from turgor.results.measures import MEASURES
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
 from turgor.study.boundary import Load, PressureCase
 from turgor.study.materials import FittedMaterial, MaterialChoice, in_case_folder
+from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
-from turgor.study.validation import StrictModel, explain, invalid, suggestion, under
+from turgor.study.validation import StrictModel, explain, inlined, invalid, suggestion, under
 
 
 def _known() -> dict[str, type[Actuator]]:
@@ -67,16 +67,6 @@ def _template_and_parameters(actuator: Actuator) -> dict[str, Any]:
     return {"template": actuator.template, **actuator.model_dump(mode="json")}
 
 
-def _inlined(schema: Any, parts: Mapping[str, Any]) -> Any:
-    """Return a JSON Schema with each reference replaced by the part that it names; no part may hold itself."""
-    if isinstance(schema, list):
-        return [_inlined(item, parts) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    rest = {key: _inlined(value, parts) for key, value in schema.items() if key != "$ref"}
-    return {**_inlined(parts[schema["$ref"].rsplit("/", 1)[1]], parts), **rest} if "$ref" in schema else rest
-
-
 class _GeometrySchema:
     """JSON Schema of the geometry: one alternative a template, so that an editor completes its parameters."""
 
@@ -86,7 +76,7 @@ class _GeometrySchema:
         for name, template in _known().items():
             schema = template.model_json_schema()
             # What pydantic refers to from here it would look for in the schema of the whole case.
-            schema = _inlined(schema, schema.pop("$defs", {}))
+            schema = inlined(schema, schema.pop("$defs", {}))
             schema["properties"] = {"template": {"const": name}, **schema["properties"]}
             schema["required"] = ["template", *schema.get("required", [])]
             alternatives.append(schema)
@@ -149,7 +139,9 @@ class Case(Setup):
         default=2.0, strict=True, gt=1.0, description="up to which the softest material is examined before the run"
     )
     solver: SolverCase = SolverCase()
-    measures: tuple[str, ...] | None = Field(default=None, description="left out, all that the actuator's names allow")
+    measures: tuple[MeasureChoice, ...] | None = Field(
+        default=None, description="left out, the usual ones that the actuator's names allow"
+    )
 
     @field_validator("name")
     @classmethod
@@ -157,14 +149,6 @@ class Case(Setup):
         if not _NAME.fullmatch(name):
             raise invalid("this cannot be a name", value=name, expected="letters, digits, '-', '_' and '.'")
         return name
-
-    @field_validator("measures")
-    @classmethod
-    def _measures_exist(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        for name in names or ():
-            if name not in MEASURES:
-                raise invalid("unknown measure", value=name, expected=suggestion(name, MEASURES))
-        return names
 
     @model_validator(mode="after")
     def _cavities_and_outputs_agree(self) -> Self:
@@ -216,6 +200,8 @@ class Case(Setup):
         for region, material in self.materials.items():
             if isinstance(material, FittedMaterial):
                 data["materials"][region]["fit"] = [(files or {}).get(path, str(path)) for path in material.fit]
+        if self.measures is not None:
+            data["measures"] = [choice.plain(files) for choice in self.measures]
         data = {key: data[key] for key in _FIRST} | {key: part for key, part in data.items() if part not in ([], {})}
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
 

@@ -17,6 +17,7 @@ def data_names(case: Case) -> dict[Path, str]:
     paths = [path for choice in case.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit]
     if isinstance(case.geometry, StepFile):
         paths.append(Path(case.geometry.file))
+    paths += [path for choice in case.measures or () for path in choice.files]
     names: dict[Path, str] = {}
     for path in dict.fromkeys(paths):
         name = f"{FOLDER}/{path.name}"

@@ -12,12 +12,13 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import registry
 from turgor.mesh import Mesh
-from turgor.results import measures
 from turgor.results.archive import Row
 from turgor.results.history import row
+from turgor.results.measures import Choice, check
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore
+from turgor.results.stored import Body, StoredState
 from turgor.results.summary import Summary, summarise
 from turgor.study.machine import peak_memory_mb
 from turgor.study.validation import suggestion
@@ -32,29 +33,61 @@ class Path:
 
     Parameters
     ----------
-    mesh
-        The mesh of the actuator.
+    body
+        The actuator: its mesh, and what a plane one stands for.
     dofs
         Number of unknowns.
     description
         What was inflated, in plain values, for the report.
+    measures
+        What is measured on each of them.
     records
         The equilibria.
     """
 
-    mesh: Mesh
+    body: Body
     dofs: int
     description: dict[str, Any]
+    measures: tuple[Choice, ...]
     records: tuple[StepRecord, ...] = ()
 
     def longer(self, record: StepRecord) -> Path:
         """Return the path with one more equilibrium."""
         return replace(self, records=(*self.records, record))
 
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the actuator."""
+        return self.body.mesh
+
     @cached_property
     def history(self) -> list[Row]:
         """One row a step: key ending in its unit → number, as in ``history.csv``."""
-        return [row(record, self.mesh, measures.available(self.mesh)) for record in self.records]
+        return [row(StoredState(self.body, record), self.measures) for record in self.records]
+
+    def measure(self, name: str, /, **parameters: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Measure every state: ``path.measure("displacement", at=("0 mm", "0 mm", "40 mm"))``.
+
+        Parameters
+        ----------
+        name
+            Of a measure.
+        parameters
+            As in a case file.
+
+        Returns
+        -------
+        ndarray
+            Numbers ``(steps, keys)``, or of a curve ``(steps, stations, columns)``, in mm, N, MPa and degrees.
+
+        Raises
+        ------
+        InputError
+            If there is no such measure, or it is impossible on this body.
+        """
+        choice = Choice.read({name: parameters})
+        check([choice], self.body)
+        return np.array([choice.of(StoredState(self.body, record)) for record in self.records])
 
     def series(self, key: str) -> pint.Quantity[Any]:
         """Return one number of every step, shape ``(steps,)``, with its unit.
@@ -69,12 +102,14 @@ class Path:
         InputError
             If the history has no such key.
         """
-        columns = {name.rsplit("_", 1)[0]: name for name in self.history[0] if name.rsplit("_", 1)[-1] in _UNITS}
+        # The longest unit first: "N_mm" ends in "mm" too.
+        units = {name: next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None) for name in self.history[0]}
+        columns = {name.removesuffix(f"_{unit}"): name for name, unit in units.items() if unit}
         if key not in columns:
             raise InputError("there is no such series", key="series", value=key, expected=suggestion(key, columns))
         name = columns[key]
-        values = np.array([entry[name] for entry in self.history])
-        return registry().Quantity(values, _UNITS[name.rsplit("_", 1)[1]])
+        values = np.array([entry[name] for entry in self.history], dtype=float)
+        return registry().Quantity(values, _UNITS[units[name] or ""])
 
     @property
     def pressure(self) -> pint.Quantity[Any]:
@@ -126,12 +161,31 @@ class Path:
         """
         place = pathlib.Path(folder)
         case = {"name": place.resolve().name, **self.description}
-        with RunStore.create(place, self.mesh, case, overwrite=overwrite) as store:
+        with RunStore.create(
+            place,
+            self.mesh,
+            case,
+            measures=self.measures,
+            section=self.body.section,
+            rigid_bodies=self.body.rigid_bodies,
+            overwrite=overwrite,
+        ) as store:
             for record in self.records:
                 store.append(record)
             store.finish(self.summary)
         return report(place)
 
 
-_UNITS = {"kPa": "kPa", "MPa": "MPa", "mm": "mm", "mm3": "mm^3", "deg": "deg", "N": "N", "s": "s"}
+_UNITS = {
+    "N_mm": "N*mm",
+    "mm2": "mm^2",
+    "percent": "percent",
+    "kPa": "kPa",
+    "MPa": "MPa",
+    "mm": "mm",
+    "mm3": "mm^3",
+    "deg": "deg",
+    "N": "N",
+    "s": "s",
+}
 """Ending of a key of the history → pint's name of the unit."""

@@ -31,7 +31,7 @@ from turgor.study.machine import peak_memory_mb
 from turgor.study.materials import FittedMaterial, build_materials
 from turgor.study.progress import Progress, Silent
 from turgor.study.runlog import RunLog
-from turgor.study.states import Recorder, standing, to_equilibrium
+from turgor.study.states import Recorder, to_equilibrium
 from turgor.study.validation import under
 
 log = logger("study")
@@ -161,7 +161,17 @@ class _Running:
 
     def _created(self, mesh: Mesh) -> RunStore:
         text = self.case.to_yaml(self.files)
-        store = RunStore.create(self.folder, mesh, text, measures=self.case.measures, overwrite=True)
+        contact = self.case.contact
+        store = RunStore.create(
+            self.folder,
+            mesh,
+            text,
+            measures=self.case.measures,
+            section=self.case.geometry.section,
+            rigid_bodies=contact.labels if contact else (),
+            files=self.files,
+            overwrite=True,
+        )
         copy_data(self.files, self.folder)
         return store
 
@@ -227,8 +237,7 @@ class _Running:
             peak_memory_mb=peak_memory_mb(),
         )
         last = store.last()
-        stands = standing(system, to_equilibrium(system, last).state) if last else {}
-        return summary | stands | ({"facts": stop.facts} if stop else {})
+        return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})
 
 
 def _load_text(name: str, value: float) -> str:

@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError
 
 from turgor.common.errors import InputError
 from turgor.fem import loads as fem_loads
+from turgor.fem.section import Section
 from turgor.fem.system import Reinforcement, System
 from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
@@ -57,29 +58,35 @@ class Setup(StrictModel):
         self._check_reinforcements(mesh)
 
     def system(
-        self, mesh: Mesh, materials: Mapping[str, Hyperelastic], pressures: Sequence[fem_loads.Pressure] = ()
+        self,
+        mesh: Mesh,
+        materials: Mapping[str, Hyperelastic],
+        pressures: Sequence[fem_loads.Pressure] = (),
+        section: Section | None = None,
     ) -> System:
         """Return the system on a mesh with a material for each region, and with `pressures` before the other loads.
+
+        A plane mesh needs a `section`.
 
         Raises
         ------
         InputError
-            If the mesh is a plane section, and as :meth:`check` and :class:`System` do.
+            As :meth:`check` and :class:`System` do.
         """
-        if mesh.dimension != 3:
-            # The mechanics know plane sections; the store, the measures and the report of a run do not.
-            raise InputError(
-                "a plane section can be meshed but not run", key="geometry.model", expected="a model in space"
-            )
         self.check(mesh)
         return System(
             mesh,
             materials,
             supports=[support.build() for support in self.supports],
-            loads=[*pressures, *(load.build() for load in self.loads)],
+            loads=[*pressures, *(self._load(load, mesh) for load in self.loads)],
             reinforcements=self._reinforcements(mesh),
+            section=section,
             contact=self.contact.build() if self.contact else [],
         )
+
+    @staticmethod
+    def _load(load: Load, mesh: Mesh) -> fem_loads.Load:
+        return load.build(mesh.dimension) if isinstance(load, GravityCase) else load.build()
 
     def _reinforcements(self, mesh: Mesh) -> list[Reinforcement]:
         threads = [fibre for choice in self.fibres for fibre in choice.build(mesh)]
@@ -97,6 +104,9 @@ class Setup(StrictModel):
                 check_name(body.surface, mesh.surfaces, f"contact.bodies.{number}.surface", "surface")
 
     def _check_reinforcements(self, mesh: Mesh) -> None:
+        for key in ("fibres", "sheets", "fibre_families"):
+            if getattr(self, key) and mesh.dimension != 3:
+                raise InputError("a plane section cannot have these", key=key, expected="a body in space")
         for number, fibre in enumerate(self.fibres):
             key = f"fibres.{number}.curve"
             if not mesh.curves:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,16 @@ import numpy as np
 from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.term import Touch
 from turgor.fem.fields import von_mises
+from turgor.fem.interface import Interface, interfaces
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.results.record import StepRecord
 from turgor.solver.newton import Equilibrium
 
 
-def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: float) -> StepRecord:
+def to_record(
+    system: System, equilibrium: Equilibrium, index: int, wall_s: float, between: Sequence[Interface]
+) -> StepRecord:
     """Return the record of an equilibrium.
 
     Parameters
@@ -29,6 +33,8 @@ def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: floa
         Number of the step.
     wall_s
         Duration of the step in s.
+    between
+        The interfaces of two materials.
     """
     state = equilibrium.state
     stress = von_mises(system, state)
@@ -52,6 +58,7 @@ def to_record(system: System, equilibrium: Equilibrium, index: int, wall_s: floa
             "contact_penalty": state.penalty,
             "contact_grips": [rows.tolist() for rows in state.grips],
         },
+        standing=standing(system, state, between),
     )
 
 
@@ -68,6 +75,7 @@ class Recorder:
 
     def __init__(self, system: System, first: int = 0) -> None:
         self.system = system
+        self._between = interfaces(system)
         self._next = first
         self.begin()
 
@@ -78,33 +86,33 @@ class Recorder:
     def record(self, equilibrium: Equilibrium) -> StepRecord:
         """Return the record of the next step."""
         wall_s = time.perf_counter() - self._begun
-        made = to_record(self.system, equilibrium, self._next, wall_s)
+        made = to_record(self.system, equilibrium, self._next, wall_s, self._between)
         self._next += 1
         self.begin()
         return made
 
 
-def standing(system: System, state: State) -> dict[str, Any]:
-    """Return how contacts and fibres stand in a state, in plain values; only what the system has.
+def standing(system: System, state: State, between: Sequence[Interface]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return how contacts, fibres and interfaces stand in a state, in plain values; only what the system has.
 
     Returns
     -------
     dict
         ``contact``: by its name, area, overlap (also in parts of the wall behind it) and what a rigid body feels;
-        ``fibres``: by its curve, the largest tension and strain.
+        ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction.
     """
-    found: dict[str, Any] = {}
-    if system.contacts:
-        found["contact"] = {touch.name: _touch(touch) for touch in system.touches(state)}
-    if system.fibres:
-        found["fibres"] = {
+    found = {
+        "contact": {touch.name: _touch(touch) for touch in system.touches(state)},
+        "fibres": {
             embedded.fibre.curve: {
                 "largest_tension_N": float(embedded.tension(state.u).max()),
                 "largest_strain": float(embedded.strain(state.u).max()),
             }
             for embedded in system.fibres
-        }
-    return found
+        },
+        "interfaces": {interface.name: interface.facts(state) for interface in between},
+    }
+    return {kind: facts for kind, facts in found.items() if facts}
 
 
 def _touch(touch: Touch) -> dict[str, Any]:

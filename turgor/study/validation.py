@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -28,6 +28,16 @@ class StrictModel(BaseModel):
                     context = {"key": str(key), "expected": suggestion(str(key), cls.model_fields)}
                     raise PydanticCustomError("unknown_key", "unknown key", context)
         return data
+
+
+def inlined(schema: Any, parts: Mapping[str, Any]) -> Any:
+    """Return a JSON Schema with each reference replaced by the part that it names; no part may hold itself."""
+    if isinstance(schema, list):
+        return [inlined(item, parts) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    rest = {key: inlined(value, parts) for key, value in schema.items() if key != "$ref"}
+    return {**inlined(parts[schema["$ref"].rsplit("/", 1)[1]], parts), **rest} if "$ref" in schema else rest
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -1,0 +1,109 @@
+"""What a measure is a function of: the body of a run, and one of its states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from turgor.fem.cavity import Cavity
+from turgor.fem.section import Axisymmetric, Section, section_of
+from turgor.geometry.section import PlaneSection
+from turgor.mesh.mesh import Mesh
+from turgor.results.record import StepRecord
+
+FloatArray = npt.NDArray[np.float64]
+ModelKind = Literal["space", "plane", "axisymmetric"]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What a run is about.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, at rest.
+    section
+        What a plane mesh stands for; ``None`` for a body in space.
+    rigid_bodies
+        Names of the rigid bodies that it may meet, each of which feels a force.
+    """
+
+    mesh: Mesh
+    section: PlaneSection | None = None
+    rigid_bodies: tuple[str, ...] = ()
+
+    @cached_property
+    def mechanics(self) -> Section | None:
+        """What the section is to the mechanics."""
+        return section_of(self.section)
+
+    @property
+    def kind(self) -> ModelKind:
+        """Whether it is a body in space, a slice in a plane, or turned about the y axis."""
+        if self.mesh.dimension == 3:
+            return "space"
+        return "axisymmetric" if isinstance(self.mechanics, Axisymmetric) else "plane"
+
+    def enclosed_volume(self, surface: str, displacement: FloatArray) -> float:
+        """Return the volume in mm³ that a surface encloses when its nodes have moved by `displacement` ``(n, d)``.
+
+        It is that of the slice or of the full turn; symmetry planes and the axis may close it.
+
+        Raises
+        ------
+        InputError
+            If there is no such surface, or it is open.
+        """
+        return Cavity(self.mesh.points, self.mesh.surface(surface), 0, surface, self.mechanics).volume(displacement)
+
+    def at_rest(self) -> StoredState:
+        """Return the state in which nothing has moved yet."""
+        n, m = self.mesh.n_points, self.mesh.n_cells
+        record = StepRecord(
+            index=0,
+            fraction=0.0,
+            loads={},
+            displacement=np.zeros_like(self.mesh.points),
+            element_pressure=np.zeros(m),
+            element_dilatation=np.ones(m),
+            von_mises=np.zeros(n),
+            von_mises_max=0.0,
+            von_mises_p99=0.0,
+            cavity_volumes={},
+            solver={},
+        )
+        return StoredState(self, record)
+
+
+@dataclass(frozen=True, eq=False)
+class StoredState:
+    """One state of a body."""
+
+    body: Body
+    record: StepRecord
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh, at rest."""
+        return self.body.mesh
+
+    @property
+    def displacement(self) -> FloatArray:
+        """Displacement of the nodes, ``(n, d)``, mm."""
+        return self.record.displacement
+
+    @property
+    def positions(self) -> FloatArray:
+        """Where the nodes are now, ``(n, d)``, mm."""
+        return np.asarray(self.mesh.points + self.record.displacement)
+
+
+def in_space(vectors: FloatArray) -> FloatArray:
+    """Return vectors or places ``(..., d)`` with three components, the third of a plane model 0."""
+    missing = 3 - vectors.shape[-1]
+    return np.concatenate([vectors, np.zeros((*vectors.shape[:-1], missing))], axis=-1) if missing else vectors
