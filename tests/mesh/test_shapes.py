@@ -25,16 +25,32 @@ def tube_volumes(tube):
     return share * inner**2 * room, share * (outer**2 * tube.length - inner**2 * room)
 
 
+def pneunet_half_widths(finger, wall, top):
+    """Half widths at heights over the floor up to `top` of what lies within `wall` of the room."""
+    z = np.linspace(0.0, top, 20001)
+    half = finger.chamber_width / 2
+    if finger.cross_section == "triangle":
+        slant = math.hypot(half, finger.chamber_height)
+        return z, half + wall * slant / finger.chamber_height - z * half / finger.chamber_height
+    if finger.cross_section == "half-round":
+        above = np.clip(z - (finger.chamber_height - half), 0.0, half + wall)
+        return z, np.sqrt((half + wall) ** 2 - above**2)
+    return z, np.full(len(z), half + wall)
+
+
 def pneunet_volumes(finger):
     n, spacing = finger.chambers, 2 * finger.wall + finger.gap
-    air = n * finger.chamber_length * finger.chamber_width * finger.chamber_height
+    z, room = pneunet_half_widths(finger, 0.0, finger.chamber_height)
+    air = n * finger.chamber_length * 2 * np.trapezoid(room, z)
     air += (n - 1) * spacing * finger.tunnel_width * finger.tunnel_height
-    width = finger.chamber_width + 2 * finger.side_wall
     length = 2 * finger.end_wall + n * finger.chamber_length + (n - 1) * spacing
-    height = finger.first_layer + finger.second_layer + finger.chamber_height + finger.top_wall
-    gap_height = finger.chamber_height + finger.top_wall - finger.tunnel_height - finger.tunnel_roof
+    z, solid = pneunet_half_widths(finger, finger.side_wall, finger.chamber_height + finger.top_wall)
+    section = 2 * np.trapezoid(solid, z) + 2 * solid[0] * (finger.first_layer + finger.second_layer)
+    low = finger.tunnel_height + finger.tunnel_roof
+    over = np.linspace(low, z[-1], 20001)
+    gaps = (n - 1) * finger.gap * 2 * np.trapezoid(np.interp(over, z, solid), over)
     share = 0.5 if finger.symmetric else 1.0
-    return share * air, share * (length * width * height - (n - 1) * finger.gap * width * gap_height - air)
+    return share * air, share * (length * section - gaps - air)
 
 
 def bellows_volumes(bellows):
@@ -186,6 +202,8 @@ OTHER_MODELS = [
     ("honeycomb", {"model": "plane"}),
     ("membrane", {"model": "plane"}),
     ("membrane", {"model": "quarter", "segments": 1}),
+    ("pneunet", {"cross_section": "triangle", "chambers": 2}),
+    ("pneunet", {"cross_section": "half-round", "chambers": 2, "symmetric": True}),
     ("tube", {"model": "axisymmetric"}),
     ("tube", {"model": "half"}),
 ]
@@ -378,12 +396,12 @@ COUNTS = {
     "fibre-tube": {"fibres": (1, 3)},
 }
 CHOICES = {
-    "tube": ("model", ("full", "half", "quarter", "axisymmetric")),
-    "pneunet": ("symmetric", (False, True)),
-    "bellows": ("model", ("half", "quarter", "axisymmetric")),
-    "membrane": ("model", ("full", "half", "quarter", "plane")),
-    "honeycomb": ("model", ("full", "half", "plane")),
-    "reinforced-tube": ("symmetric", (False, True)),
+    "pneunet": {"cross_section": ("square", "triangle", "half-round"), "symmetric": (False, True)},
+    "tube": {"model": ("full", "half", "quarter", "axisymmetric")},
+    "bellows": {"model": ("half", "quarter", "axisymmetric")},
+    "membrane": {"model": ("full", "half", "quarter", "plane")},
+    "honeycomb": {"model": ("full", "half", "plane")},
+    "reinforced-tube": {"symmetric": (False, True)},
 }
 
 
@@ -395,8 +413,7 @@ def random_actuator(draw, name):
         parameters[key] = f"{draw(st.floats(low, high)):.3f} {unit}"
     for key, (low, high) in COUNTS.get(name, {}).items():
         parameters[key] = draw(st.integers(low, high))
-    if name in CHOICES:
-        key, choices = CHOICES[name]
+    for key, choices in CHOICES.get(name, {}).items():
         parameters[key] = draw(st.sampled_from(choices))
     try:
         return actuator(name, **parameters)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -11,10 +12,13 @@ from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
-from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, rectangle
+from turgor.geometry.chamber import Chamber, CrossSection
+from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, along, rectangle
+from turgor.geometry.path import Piece
 from turgor.geometry.section import CUTS
 
 _STUDY = "Esmalipour and Ajri, PneuNet geometry study, Table 1"
+_STUDY_FORMS = "Esmalipour and Ajri, PneuNet geometry study, section 4; half-round assumed"
 _ASSUMED = "assumed"
 
 Point = tuple[float, float, float]
@@ -47,6 +51,9 @@ class PneuNet(Actuator):
     tunnel_roof: PositiveLength = parameter("2 mm", "thickness of the solid over the passage in a gap", _ASSUMED)
     first_layer: PositiveLength = parameter("2 mm", "thickness of the bottom under the chambers", f"{_STUDY}: tb")
     second_layer: NonNegativeLength = parameter("1 mm", "thickness of the layer below it, region 'base'", _ASSUMED)
+    cross_section: CrossSection = parameter(
+        "square", "shape of the chambers across the finger; its outside runs parallel to it", _STUDY_FORMS
+    )
     symmetric: bool = parameter(False, "only the half y ≥ 0, with the surface 'symmetry'", _ASSUMED)
 
     @property
@@ -69,18 +76,28 @@ class PneuNet(Actuator):
         """Height of the floor of chambers and passage."""
         return float(self.first_layer + self.second_layer)
 
+    @property
+    def _chamber(self) -> Chamber:
+        """The section across a chamber."""
+        return Chamber(self.cross_section, self.chamber_width, self.chamber_height, self.side_wall, self.top_wall)
+
     def check(self) -> None:
-        """Raise InputError if the passage does not fit the chambers, or its roof fills the gaps."""
+        """Raise InputError if the chambers' walls meet, the passage does not fit them, or its roof fills the gaps."""
         if self.tunnel_height >= self.chamber_height:
             self._refuse("tunnel_height", "the air passage is as high as the chambers", self.chamber_height)
-        if self.tunnel_width > self.chamber_width:
-            self._refuse("tunnel_width", "the air passage is wider than the chambers", self.chamber_width)
+        if self.cross_section == "half-round" and 2.0 * self.chamber_height < self.chamber_width:
+            self._refuse("chamber_width", "the chambers are too low for a half circle", 2.0 * self.chamber_height)
+        if self.top_wall > self._chamber.thickest_top * (1 + 1e-9):
+            self._refuse("top_wall", "the outsides of the sides meet below the top", self._chamber.thickest_top)
+        room = 2.0 * self._chamber.room(self.tunnel_height)
+        if self.tunnel_width > room * (1 + 1e-9):
+            self._refuse("tunnel_width", "the air passage is wider than the chambers at its roof", room)
         room = self.chamber_height + self.top_wall - self.tunnel_height
         if self.tunnel_roof >= room:
             self._refuse("tunnel_roof", "the roof of the passage fills the gaps: the chambers' walls meet", room)
 
     def _refuse(self, key: str, problem: str, limit: float) -> None:
-        raise InputError(problem, key=key, value=f"{getattr(self, key):g} mm", expected=f"less than {limit:g} mm")
+        raise InputError(problem, key=key, value=f"{getattr(self, key):g} mm", expected=f"less than {limit:.4g} mm")
 
     def views(self) -> list[View]:
         """Show the section along the finger, the walls around the first gap, and the section across a chamber."""
@@ -115,30 +132,47 @@ class PneuNet(Actuator):
         return [whole, detail, self._across(top)]
 
     def _across(self, top: float) -> View:
-        half, side, low = 0.5 * self.chamber_width, 0.5 * self.chamber_width + self.side_wall, self.second_layer
-        areas = [("body", rectangle(-side, side, low, top)), ("base", rectangle(-side, side, 0.0, low))]
-        roof, ceiling, width = self._floor + self.tunnel_height, top - self.top_wall, 0.5 * self.tunnel_width
-        marks = [
-            Distance("chamber_width", (-half, top), (half, top), 2),
-            Distance("side_wall", (half, top), (side, top), 1),
+        chamber, low, floor = self._chamber, self.second_layer, np.array([0.0, self._floor])
+        side, half, width = chamber.half_width, 0.5 * self.chamber_width, 0.5 * self.tunnel_width
+        roof, ceiling = self._floor + self.tunnel_height, top - self.top_wall
+        # A wall is measured across the face of the room, at half the height of a triangle's side.
+        slope = chamber.slope
+        foot = np.array([half * (0.5 if slope else 1.0), self._floor + (0.5 if slope else 0.3) * self.chamber_height])
+        if self.cross_section == "half-round":
+            foot[1] = self._floor + 0.5 * min(self.chamber_height - half, self.chamber_height)
+        across = self.side_wall * np.array([math.sin(slope), math.cos(slope)] if slope else [1.0, 0.0])
+        outer = foot + across
+        marks: list[Mark] = [
+            Distance("chamber_width", (-half, self._floor), (half, self._floor), 5),
+            Distance("side_wall", (float(foot[0]), float(foot[1])), (float(outer[0]), float(outer[1]))),
             Distance("chamber_height", (-side, self._floor), (-side, ceiling), 1),
             Distance("top_wall", (side, ceiling), (side, top), -1),
             Distance("first_layer", (side, low), (side, self._floor), -1),
             Distance("tunnel_width", (-width, roof), (width, roof), 1),
+            Pointer("cross_section", (-0.5 * side, top) if self.cross_section == "square" else (0.0, top), 90),
             *([Distance("second_layer", (-side, 0.0), (-side, low), 1)] if low else []),
         ]
-        passage = rectangle(-width, width, self._floor, roof)
-        areas = [*areas[: 2 if low else 1], (AIR, rectangle(-half, half, self._floor, ceiling)), (AIR, passage)]
+        areas = [("body", along(chamber.outside(-self.first_layer)) + floor)]
+        if low:
+            areas.append(("base", rectangle(-side, side, 0.0, low)))
+        areas += [(AIR, along(chamber.inside()) + floor), (AIR, rectangle(-width, width, self._floor, roof))]
         return View("section across a chamber; the passage behind it", areas, marks)
 
     def draw(self) -> Shape:
         """Draw the comb-shaped body less the air, on top of the base layer."""
         occ = cad.occ()
-        half = 0.5 * self.chamber_width + self.side_wall
+        half = self._chamber.half_width
         start = 0.0 if self.symmetric else -half
-        body = cad.prism([(x, start, z) for x, z in self._profile()], (0.0, half - start, 0.0))
-        air = [(3, occ.addBox(*corner, *extent)) for corner, extent in self._air(start)]
-        (solid,), _ = occ.cut([(3, body)], air)
+        body = [(3, cad.prism([(x, start, z) for x, z in self._profile()], (0.0, half - start, 0.0)))]
+        if self.cross_section == "square":
+            air = [(3, occ.addBox(*corner, *extent)) for corner, extent in self._chamber_boxes(start)]
+        else:
+            outside = self._swept(self._chamber.outside(-self.first_layer), 0.0, self.length)
+            body, _ = occ.intersect(body, [outside])
+            inside = self._chamber.inside()
+            air = [self._swept(inside, x, self.chamber_length) for x in self._chamber_starts()]
+        air += [(3, occ.addBox(*corner, *extent)) for corner, extent in self._passage(start)]
+        (solid,), _ = occ.cut(body, air)
         solids = [solid]
         if self.second_layer > 0.0:
             solids.append((3, occ.addBox(0, start, 0, self.length, half - start, self.second_layer)))
@@ -172,15 +206,27 @@ class PneuNet(Actuator):
             corners += [(start - self.wall - self.gap, roof), (start - self.wall - self.gap, top)]
         return [*corners, (0.0, top)]
 
-    def _air(self, side: float) -> Iterator[tuple[Point, Point]]:
-        """Yield corner and extent of each chamber and of the passage, halved if the body begins at y = `side` = 0."""
-        low, high = (0.0 if side == 0.0 else -0.5), 0.5
-        starts = list(self._chamber_starts())
-        for x in starts:
-            width = self.chamber_width
-            corner = (x, low * width, self._floor)
-            yield corner, (self.chamber_length, (high - low) * width, self.chamber_height)
+    def _swept(self, outline: list[Piece], start: float, length: float) -> tuple[int, int]:
+        """Draw what has this outline across the finger, its floor at that of the chambers, from x = `start` on."""
+        occ = cad.occ()
+        solid = (3, cad.sweep(cad.plane_face(outline), (0.0, -length, 0.0)))
+        # Drawn in the plane y = 0 and turned about z, the sweep along −y runs along x.
+        occ.rotate([solid], 0, 0, 0, 0, 0, 1, 0.5 * math.pi)
+        occ.translate([solid], start, 0, self._floor)
+        return solid
+
+    def _chamber_boxes(self, side: float) -> Iterator[tuple[Point, Point]]:
+        """Yield corner and extent of each chamber, halved if the body begins at y = `side` = 0."""
+        width, low = self.chamber_width, 0.0 if side == 0.0 else -0.5
+        for x in self._chamber_starts():
+            yield (
+                (x, low * width, self._floor),
+                (self.chamber_length, (0.5 - low) * width, self.chamber_height),
+            )
+
+    def _passage(self, side: float) -> Iterator[tuple[Point, Point]]:
+        """Yield corner and extent of the air passage, if there is any, halved like the chambers."""
+        width, low, starts = self.tunnel_width, 0.0 if side == 0.0 else -0.5, list(self._chamber_starts())
         if self.chambers > 1:
-            width = self.tunnel_width
-            corner = (starts[0], low * width, self._floor)
-            yield corner, (starts[-1] - starts[0], (high - low) * width, self.tunnel_height)
+            extent = (starts[-1] - starts[0], (0.5 - low) * width, self.tunnel_height)
+            yield (starts[0], low * width, self._floor), extent

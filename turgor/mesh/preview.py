@@ -15,9 +15,9 @@ from turgor.mesh.picture import save_picture
 
 
 def save_preview(actuator: Actuator, path: str | Path) -> None:
-    """Draw an actuator with its dimensions, mesh it (cut open), and save both as one PNG file; no screen is needed.
+    """Draw an actuator, mesh it (one half, where there is a plane of symmetry) and save both as one PNG file.
 
-    Of a plane shape only the drawing is there.
+    No screen is needed. Of a plane shape only the drawing is there.
 
     Raises
     ------
@@ -33,11 +33,18 @@ def save_preview(actuator: Actuator, path: str | Path) -> None:
         raise InputError("there is no such folder", value=str(path.parent))
     picture = None
     if actuator.section is None:
-        mesh = generate(actuator)
-        # A whole body hides its cavities, unless it is drawn translucent for its fibres.
-        is_whole = not mesh.curves and not any(name.startswith("symmetry") for name in mesh.surfaces)
         with tempfile.TemporaryDirectory() as folder:
             image = Path(folder) / "mesh.png"
-            save_picture(mesh, image, cut=is_whole, window=(1430, 800))
+            save_picture(generate(_opened(actuator)), image, window=(1430, 800))
             picture = matplotlib.image.imread(image)
     save_drawing(actuator, path, picture)
+
+
+def _opened(actuator: Actuator) -> Actuator:
+    """Return the half of a whole actuator, which shows its cavities; one without a plane of symmetry stays."""
+    fields = type(actuator).model_fields
+    if "symmetric" in fields:
+        return actuator.changed(symmetric=True)
+    if "model" in fields and actuator.model_dump()["model"] == "full":
+        return actuator.changed(model="half")
+    return actuator
