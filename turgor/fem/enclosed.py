@@ -11,11 +11,12 @@ from typing import Protocol
 
 import numba as nb
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from turgor.fem.kernels import FASTMATH
 from turgor.mesh.cells import CELLS, face_cell
-from turgor.mesh.opening import VolumeField
+from turgor.mesh.opening import Cap, VolumeField
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -62,6 +63,49 @@ class FaceVolume:
         out = np.empty((len(self.nodes), n_dofs, n_dofs))
         _hessians(x - self._origin, self.nodes, *self._rule, out)
         return out
+
+
+class CapVolume:
+    """The share of a cap, whose faces hang on the nodes of a rim: V(T x), T linear, and so are its derivatives."""
+
+    def __init__(self, cap: Cap, field: VolumeField) -> None:
+        self.nodes = cap.nodes[None]
+        self._cap = cap
+        self._origin = field.origin
+        cell = face_cell(cap.faces)
+        self._rule = (cell.shape_at_quadrature, cell.gradient_at_quadrature, cell.weights, field.axes)
+
+    def volume(self, x: Floats) -> float:
+        """Return the volume, mm³."""
+        return float(_volumes(self._places(x), self._cap.faces, *self._rule).sum())
+
+    def gradient(self, x: Floats) -> Floats:
+        """Return the derivative by the nodes of the rim, ``(1, n, 3)``."""
+        shares = _gradients(self._places(x), self._cap.faces, *self._rule)
+        faces = self._cap.faces.ravel()
+        columns = [
+            matrix.T @ np.bincount(faces, shares[:, :, axis].ravel(), minlength=matrix.shape[0])
+            for axis, matrix in enumerate(self._cap.weights)
+        ]
+        return np.stack(columns, axis=1)[None]
+
+    def hessian(self, x: Floats) -> Floats:
+        """Return the second derivatives, ``(1, 3 n, 3 n)``."""
+        faces, weights, n = self._cap.faces, self._cap.weights, self.nodes.shape[1]
+        blocks = np.empty((len(faces), 18, 18))
+        _hessians(self._places(x), faces, *self._rule, blocks)
+        blocks = blocks.reshape(len(faces), 6, 3, 6, 3)
+        row, column = np.broadcast_arrays(faces[:, :, None], faces[:, None, :])
+        size = weights[0].shape[0]
+        out = np.zeros((n, 3, n, 3))
+        for i in range(3):
+            for j in range(3):
+                whole = sp.coo_matrix((blocks[:, :, i, :, j].ravel(), (row.ravel(), column.ravel())), (size, size))
+                out[:, i, :, j] = (weights[i].T @ whole.tocsr() @ weights[j]).toarray()
+        return out.reshape(1, 3 * n, 3 * n)
+
+    def _places(self, x: Floats) -> Floats:
+        return self._cap.places(x - self._origin)
 
 
 _EDGE = CELLS["line3"]

@@ -90,15 +90,16 @@ class System:
         beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only, section) for s in springs]
         check_held(mesh, self.constraints, springs, section)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
+        caps = [cap for cavity in self.cavities for cap in cavity.caps]
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
         self.contacts = [self._contact(materials, case, number) for number, case in enumerate(contact)]
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *beds, *dead, *embedded, *self.contacts)
+        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *caps, *beds, *dead, *embedded, *self.contacts)
         pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
-        self._loaded: tuple[Loaded, ...] = (*self.cavities, *dead, *pushed)
+        self._loaded: tuple[Loaded, ...] = (*self.cavities, *caps, *dead, *pushed)
 
         self._couplings: list[Ints] = [c.couplings(np.zeros_like(mesh.points)) for c in self.contacts]
         self._touching: list[tuple[Ints, Floats]] = []
@@ -291,7 +292,8 @@ class System:
         return make_contact(self.mesh, materials, case, pressure, channel, self.section, number)
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
-        cavity = Cavity(self.mesh.points, self.mesh.surface(load.cavity), channel, load.cavity, self.section)
+        mesh = self.mesh
+        cavity = Cavity(mesh.points, mesh.surface(load.cavity), channel, load.cavity, self.section, mesh.caps)
         check_rim(cavity, self.constraints)
         return cavity
 

@@ -272,11 +272,14 @@ def face_frames(nodes: Floats) -> tuple[Floats, Floats]:
     return places, np.cross(tangents[..., 0], tangents[..., 1])
 
 
-def face_fluxes(nodes: Floats) -> tuple[Floats, Floats]:
-    """Return ``∫ x·n dA`` ``(k,)`` and ``∫ n dA`` ``(k, d)`` over faces with `nodes` ``(k, n_nodes, d)``, exactly."""
+def face_fluxes(nodes: Floats, axes: Floats | float = 1.0) -> tuple[Floats, Floats]:
+    """Return ``∫ M x·n dA`` ``(k,)`` and ``∫ n dA`` ``(k, d)`` over faces with `nodes` ``(k, n_nodes, d)``, exactly.
+
+    M is the diagonal matrix of the `axes`.
+    """
     places, normals = face_frames(nodes)
     weights = _FACE[nodes.shape[1]].weights
-    flux: Floats = np.einsum("q,kqi,kqi->k", weights, places, normals)
+    flux: Floats = np.einsum("q,kqi,kqi->k", weights, axes * places, normals)
     return flux, np.einsum("q,kqi->ki", weights, normals)
 
 

@@ -1,10 +1,10 @@
 """Mesh files: write and read a mesh with all its names, as gmsh's .msh or VTK's .vtu.
 
-In a file a region is a set of cells, a surface of their faces, a marker of vertices and a curve of lines between
-points of its own; a plane mesh lies in the plane of x and y. In gmsh's format each is a physical group called
-``region:body`` (the kind is written out since a region and a marker may share a name; without it the group's dimension
-decides). In VTK's, where cells have no sets, each is a cell array of that name, 1 on its cells and 0 elsewhere, by
-which ParaView can threshold.
+In a file a region is a set of cells, a surface of their faces, a cap of edges, a marker of vertices and a curve of
+lines between points of its own; a plane mesh lies in the plane of x and y. In gmsh's format each is a physical group
+called ``region:body`` (the kind is written out since a region and a marker may share a name; without it the group's
+dimension decides). In VTK's, where cells have no sets, each is a cell array of that name, 1 on its cells and 0
+elsewhere, by which ParaView can threshold.
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ def _to_sets(mesh: Mesh) -> tuple[FloatArray, Sets]:
     sets: Sets = {("region", name): mesh.cells[cells] for name, cells in mesh.regions.items()}
     sets |= {("surface", name): triangles for name, triangles in mesh.surfaces.items()}
     sets |= {("marker", name): nodes[:, None] for name, nodes in mesh.markers.items()}
+    sets |= {("cap", name): edges for name, edges in mesh.caps.items()}
     flat = 3 - mesh.dimension
     points = [np.pad(mesh.points, ((0, 0), (0, flat)))]
     for name, curve in mesh.curves.items():
@@ -126,6 +127,7 @@ def _from_sets(points: FloatArray, sets: Sets) -> Mesh:
         },
         {name: index[nodes[:, 0]] for name, nodes in _of_kind(sets, "marker")},
         {name: points[np.append(lines[:, 0], lines[-1, 1])] for name, lines in _of_kind(sets, "curve")},
+        {name: index[edges] for name, edges in _of_kind(sets, "cap")},
     )
 
 
@@ -179,7 +181,7 @@ def _read_vtu(path: Path) -> tuple[FloatArray, Sets]:
     sets: Sets = {}
     for array, values in stored.cell_data.items():
         kind, _, name = array.partition(":")
-        if kind not in _KIND_OF_DIMENSION.values():
+        if kind not in (*_KIND_OF_DIMENSION.values(), "cap"):
             continue
         blocks = [block.data[flag != 0] for block, flag in zip(stored.cells, values, strict=True)]
         blocks = [block for block in blocks if len(block)]

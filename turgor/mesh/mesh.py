@@ -17,11 +17,11 @@ from turgor.mesh.cells import (
     body_cell,
     determinants,
     face_areas,
-    face_fluxes,
     is_body_cell,
     jacobians,
 )
-from turgor.mesh.faces import host_cells, rim_edges
+from turgor.mesh.faces import host_cells
+from turgor.mesh.opening import volume_field
 from turgor.mesh.tet10 import FloatArray, IntArray, cell_volumes
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -51,6 +51,8 @@ class Mesh:
         Name → node indices: a point, or points in order along a line.
     curves
         Name → ``(j, d)`` points of a polyline that runs through the cells without belonging to them.
+    caps
+        Name → edges ``(e, 3)`` (two ends, middle) of the rim of an opening that no air passes.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class Mesh:
     surfaces: Mapping[str, IntArray] = field(default_factory=dict)
     markers: Mapping[str, IntArray] = field(default_factory=dict)
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    caps: Mapping[str, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._set("cells", _frozen_cells(self.cells, np.shape(self.points)[-1:]))
@@ -74,10 +77,13 @@ class Mesh:
         self._set("surfaces", _frozen_map(self.surfaces, np.int32, (None, face_nodes), "surfaces"))
         self._set("markers", _frozen_map(self.markers, np.int32, (None,), "markers"))
         self._set("curves", _frozen_map(self.curves, np.float64, (None, d), "curves"))
+        self._set("caps", _frozen_map(self.caps, np.int32, (None, 3), "caps"))
         self._check_points_and_cells()
         self._check_regions()
         for name, nodes in self.markers.items():
             _check_indices(nodes, self.n_points, f"markers.{name}", "nodes")
+        for name, edges in self.caps.items():
+            _check_indices(edges, self.n_points, f"caps.{name}", "nodes")
         for name, faces in self.surfaces.items():
             self._check_surface(name, faces)
 
@@ -142,29 +148,27 @@ class Mesh:
             return float(cell_volumes(nodes).sum())
         return float((determinants(jacobians(nodes, self.cell)) @ self.cell.weights).sum())
 
-    def enclosed_volume(self, surface: str) -> float:
-        """Return the volume in mm³ of the air that a surface encloses, ``−⅓ ∫ x·n dA`` over its curved faces.
+    def enclosed_volume(self, surface: str, displacement: FloatArray | None = None) -> float:
+        """Return the volume in mm³ of the air that a surface encloses, in the plane the area in mm².
 
-        In the plane it is the area in mm², ``−½ ∫ x·n ds``. The normal n points out of the solid, so a cavity's volume
-        is positive. The surface must be closed, or closed by the coordinate planes through the origin (a half, a
-        quarter or an octant model), on which x·n vanishes.
+        It is the flux of a field of unit divergence through the curved faces (:mod:`turgor.mesh.opening`). The surface
+        must be closed, or be closed by symmetry planes across the axes at the ends of the mesh, or by caps.
+
+        Parameters
+        ----------
+        surface
+            Its normals point out of the solid, so a cavity's volume is positive.
+        displacement
+            Of the nodes, ``(n, d)`` in mm; left out, none.
 
         Raises
         ------
         InputError
-            For an unknown name, or a surface with a rim outside these planes: it encloses no volume.
+            For an unknown name, or a surface that leaks.
         """
         faces = self.surface(surface)
-        rim = self.points[rim_edges(faces)]
-        reach = np.abs(self.points).max()
-        if not (np.abs(rim) <= 1e-9 * reach).all(axis=1).any(axis=1).all():
-            raise InputError(
-                "the surface is open and encloses no volume",
-                key=surface,
-                expected="a closed surface, or one whose rim lies in coordinate planes through the origin",
-            )
-        flux, _ = face_fluxes(self.points[faces])
-        return -float(flux.sum()) / self.dimension
+        field = volume_field(self.points, faces, surface, caps=self.caps)
+        return field.enclosed(self.points if displacement is None else self.points + displacement, faces)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)

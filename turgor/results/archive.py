@@ -27,7 +27,7 @@ Curves = dict[str, list[Row]]
 """The curves of a state: title → rows."""
 
 _Content = TypeVar("_Content")
-_NAMED = ("regions", "surfaces", "markers", "curves")
+_NAMED = ("regions", "surfaces", "markers", "curves", "caps")
 
 
 def save_mesh(path: Path, mesh: Mesh) -> None:

@@ -52,14 +52,16 @@ class Body:
     def enclosed_volume(self, surface: str, displacement: FloatArray) -> float:
         """Return the volume in mm³ that a surface encloses when its nodes have moved by `displacement` ``(n, d)``.
 
-        It is that of the slice or of the full turn; symmetry planes and the axis may close it.
+        It is that of the slice or of the full turn; symmetry planes, caps and the axis may close it.
 
         Raises
         ------
         InputError
             If there is no such surface, or it is open.
         """
-        return Cavity(self.mesh.points, self.mesh.surface(surface), 0, surface, self.mechanics).volume(displacement)
+        mesh = self.mesh
+        cavity = Cavity(mesh.points, mesh.surface(surface), 0, surface, self.mechanics, mesh.caps)
+        return cavity.volume(displacement)
 
     def at_rest(self) -> StoredState:
         """Return the state in which nothing has moved yet."""
