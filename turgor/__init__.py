@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         PneuNet,
         ReinforcedTube,
         StepFile,
+        StlFile,
         preview,
     )
     from turgor.study.specimen import read_tests
@@ -63,6 +64,7 @@ __all__ = [
     "Run",
     "SolverError",
     "StepFile",
+    "StlFile",
     "TurgorError",
     "assess",
     "environment",
@@ -112,6 +114,7 @@ _HOMES = {
         "PneuNet",
         "ReinforcedTube",
         "StepFile",
+        "StlFile",
         "preview",
     ),
     "turgor.study.specimen": ("read_tests",),

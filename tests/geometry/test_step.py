@@ -115,10 +115,10 @@ def test_bad_parts_are_refused(hollow, changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"mount": {}}, "mount: no rule says which faces"),
-        ({"mount": {"normal": (1, 1, 1)}}, "mount: no face follows these rules"),
+        ({"mount": {}}, "mount: no rule says what is meant"),
+        ({"mount": {"normal": (1, 1, 1)}}, "mount: nothing follows these rules"),
         ({"mount": {"normal": (0, 0, 0)}}, "a direction has no length"),
-        ({"tip_face": BOTTOM}, "tip-face: a face of it belongs to 'mount' already"),
+        ({"tip_face": BOTTOM}, "tip_face: a face of it belongs to 'mount' already"),
         ({"surfaces": {"cavity-1": TOP}}, "surfaces.cavity-1: a closed pocket has this name"),
     ],
 )

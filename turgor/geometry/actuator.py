@@ -44,6 +44,10 @@ class Shape:
     dimension
         3, or 2 for a section drawn in the plane y = 0, whose coordinates are (x, z): a slice along y, or one half of
         the section through a body of revolution around z.
+    caps
+        Name → tags of edges of the rim of an opening in a cavity, which is closed for the air but not for the mesh.
+    faceted
+        Volume in mm³ and area in mm² of a body of flat facets, which the CAD kernel does not know.
     """
 
     regions: Mapping[str, Sequence[int]]
@@ -52,6 +56,8 @@ class Shape:
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
     sizes: Mapping[str, float] = field(default_factory=dict)
     dimension: int = 3
+    caps: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    faceted: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

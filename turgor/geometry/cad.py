@@ -122,13 +122,13 @@ def bounds(dimension: int, tag: int) -> tuple[Any, Any]:
     return box[:3], box[3:]
 
 
-def skins(faces: Collection[int], dimension: int = 3) -> list[list[int]]:
+def skins(faces: Collection[int], dimension: int = 3, walls: Collection[int] = ()) -> list[list[int]]:
     """Group `faces` into sets that hang together by their edges, the one of the largest extent first.
 
     Of a solid's boundary the first set is the outside and every further one is a closed cavity; where symmetry planes
-    cut the solid, leave their faces out and the same holds.
+    cut the solid, leave their faces out and the same holds. Edges in `walls` do not join.
     """
-    edges = {face: _sides(dimension - 1, face) for face in faces}
+    edges = {face: sides(dimension - 1, face) - set(walls) for face in faces}
     groups: list[list[int]] = []
     left = sorted(faces)
     while left:
@@ -139,7 +139,7 @@ def skins(faces: Collection[int], dimension: int = 3) -> list[list[int]]:
             front |= set().union(*(edges[face] for face in joined))
             left = [face for face in left if face not in joined]
         groups.append(sorted(group))
-    return sorted(groups, key=lambda group: _extent(dimension - 1, group), reverse=True)
+    return sorted(groups, key=lambda group: extent(group, dimension - 1), reverse=True)
 
 
 def named_skin(
@@ -180,11 +180,20 @@ def with_points(volume: int, points: Any, dimension: int = 3) -> int:
     return int(pieces[0][0][1])
 
 
-def _sides(dimension: int, tag: int) -> set[int]:
+def vertices(faces: Collection[int]) -> Any:
+    """Return the places ``(k, 3)`` of the vertices of `faces`, each once, in ascending order of their tags."""
+    model = kernel().model
+    found = model.getBoundary([(2, face) for face in faces], combined=False, oriented=False, recursive=True)
+    return np.array([model.getValue(0, tag, []) for tag in sorted({tag for _, tag in found})]).reshape(-1, 3)
+
+
+def sides(dimension: int, tag: int) -> set[int]:
+    """Return the tags of the faces of a volume, of the edges of a face or of the ends of an edge."""
     return {abs(side) for _, side in kernel().model.getBoundary([(dimension, tag)], oriented=False)}
 
 
-def _extent(dimension: int, tags: list[int]) -> float:
+def extent(tags: Collection[int], dimension: int = 2) -> float:
+    """Return the length of the diagonal of the box around faces, mm."""
     corners = [bounds(dimension, tag) for tag in tags]
     low = np.min([corner[0] for corner in corners], axis=0)
     high = np.max([corner[1] for corner in corners], axis=0)

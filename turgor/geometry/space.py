@@ -1,15 +1,17 @@
-"""Parts of space that rules speak of: boxes, balls, cylinders, half-spaces, and their combinations."""
+"""Parts of space that rules speak of: boxes, balls, cylinders, half-spaces, bodies from STL files, and combinations."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from turgor.common.errors import InputError
 from turgor.common.units import Length, PositiveLength
+from turgor.geometry.imported.surface import StlUnit, read_surface
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -62,6 +64,38 @@ class HalfSpace(_Part):
         return inside
 
 
+class NearBody(_Part):
+    """All space inside the body of an STL file, or nearer to it than `distance` (a negative one: that deep inside).
+
+    Parameters
+    ----------
+    file
+        Its path; in a case file relative to that.
+    unit
+        Of the numbers in the file.
+    distance
+        From the body's surface.
+    """
+
+    file: str
+    unit: StlUnit
+    distance: Length = Field(default="0 mm", validate_default=True)
+
+    @field_validator("file")
+    @classmethod
+    def _is_there(cls, file: str, info: ValidationInfo) -> str:
+        path: Path = (info.context or {}).get("folder", Path()) / Path(file).expanduser()
+        if not path.is_file():
+            raise ValueError("there is no such file") from InputError("there is no such file", value=str(path))
+        return str(path)
+
+    def contains(self, points: FloatArray) -> BoolArray:
+        """Say of each of the `points` ``(n, 3)`` whether it lies inside; raise InputError if the file is no body."""
+        distance, _, _ = read_surface(self.file, self.unit).solid.distance(points)
+        inside: BoolArray = distance <= self.distance
+        return inside
+
+
 class Space(_Part):
     """A part of space; of several keys all must hold.
 
@@ -69,7 +103,7 @@ class Space(_Part):
     ----------
     box
         Two opposite corners.
-    ball, cylinder, half_space
+    ball, cylinder, half_space, stl
         As these say.
     all_of, any_of, none_of
         Other parts of space: in all of them, in at least one, in none.
@@ -84,13 +118,15 @@ class Space(_Part):
     ball: Ball | None = None
     cylinder: Cylinder | None = None
     half_space: HalfSpace | None = None
+    stl: NearBody | None = None
     all_of: tuple[Space, ...] = Field(default=())
     any_of: tuple[Space, ...] = Field(default=())
     none_of: tuple[Space, ...] = Field(default=())
 
     def contains(self, points: FloatArray) -> BoolArray:
         """Say of each of the `points` ``(n, 3)`` whether it lies inside, faces included."""
-        tests = [part.contains(points) for part in (self.ball, self.cylinder, self.half_space) if part is not None]
+        simple = (self.ball, self.cylinder, self.half_space, self.stl)
+        tests = [part.contains(points) for part in simple if part is not None]
         if self.box is not None:
             corners = np.array(self.box)
             tests.append(((points >= corners.min(axis=0)) & (points <= corners.max(axis=0))).all(axis=1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -35,6 +35,7 @@ _HALVINGS = 4
 
 # gmsh's numbers for these elements, and its tetrahedron's nodes in our order.
 _TET10, _TRI6, _LINE3 = 11, 9, 8
+_NODES = {_TET10: 10, _TRI6: 6, _LINE3: 3}
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
@@ -88,7 +89,7 @@ def generate(
         scale = min(1.0, chosen / default)
         local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
         _set_local_sizes(gmsh, shape, local)
-        _check_count(gmsh, chosen)
+        _check_count(gmsh, shape, chosen)
         progress(f"meshing with elements of {chosen:g} mm")
         circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
         circle = circle if per_circle is None else per_circle
@@ -127,10 +128,12 @@ def _set_local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float])
         field.setAsBackgroundMesh(smallest)
 
 
-def _check_count(gmsh: ModuleType, size: float) -> None:
+def _check_count(gmsh: ModuleType, shape: Shape, size: float) -> None:
     """Refuse a size that would fill the memory before anybody could interrupt."""
-    volume = sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
-    area = sum(gmsh.model.occ.getMass(2, tag) for _, tag in gmsh.model.getEntities(2))
+    volume, area = shape.faceted or (
+        sum(gmsh.model.occ.getMass(dimension, tag) for _, tag in gmsh.model.getEntities(dimension))
+        for dimension in (3, 2)
+    )
     # Regular tetrahedra and, where walls are thinner than the size, three to every triangle of the skin.
     count = 8.5 * volume / size**3 + 3 * 2.3 * area / size**2
     if count > MOST_CELLS:
@@ -167,10 +170,7 @@ def _curved(gmsh: ModuleType, shape: Shape) -> _Cells:
 
 def _read_cells(gmsh: ModuleType, shape: Shape) -> _Cells:
     kind, order = (_TET10, _GMSH_TO_VTK) if shape.dimension == 3 else (_TRI6, list(range(6)))
-    blocks = {
-        name: np.vstack([gmsh.model.mesh.getElementsByType(kind, tag)[1].reshape(-1, len(order)) for tag in tags])
-        for name, tags in shape.regions.items()
-    }
+    blocks = {name: _elements(gmsh, kind, tags) for name, tags in shape.regions.items()}
     tags, cells = np.unique(np.vstack(list(blocks.values())), return_inverse=True)
     all_tags, coordinates, _ = gmsh.model.mesh.getNodes()
     points = coordinates.reshape(-1, 3)[np.argsort(all_tags)][np.searchsorted(np.sort(all_tags), tags)]
@@ -191,14 +191,35 @@ def _read_cells(gmsh: ModuleType, shape: Shape) -> _Cells:
     return _Cells(points, np.asarray(cells, dtype=np.int32), regions, index)
 
 
+def _elements(gmsh: ModuleType, kind: int, tags: Sequence[int]) -> npt.NDArray[np.uint64]:
+    """Return gmsh's node tags ``(k, n)`` of the elements of one kind on some entities."""
+    found = [gmsh.model.mesh.getElementsByType(kind, tag)[1] for tag in tags]
+    return np.concatenate(found).reshape(-1, _NODES[kind])
+
+
 def _named_mesh(gmsh: ModuleType, shape: Shape, mesh: _Cells) -> Mesh:
     surfaces = {}
-    kind, nodes = (_TRI6, 6) if shape.dimension == 3 else (_LINE3, 3)
+    kind = _TRI6 if shape.dimension == 3 else _LINE3
     for name, tags in shape.surfaces.items():
-        faces = np.vstack([gmsh.model.mesh.getElementsByType(kind, tag)[1].reshape(-1, nodes) for tag in tags])
-        surfaces[name] = outward_faces(mesh.cells, mesh.index[faces[:, : shape.dimension]])
+        faces = _elements(gmsh, kind, tags)[:, : shape.dimension]
+        surfaces[name] = outward_faces(mesh.cells, mesh.index[faces])
     markers = {name: nodes_on_polyline(mesh.points, line, name) for name, line in shape.markers.items()}
-    return Mesh(mesh.points, mesh.cells, mesh.regions, surfaces, markers, shape.curves)
+    caps = {name: mesh.index[_elements(gmsh, _LINE3, tags)] for name, tags in shape.caps.items()}
+    named = Mesh(mesh.points, mesh.cells, mesh.regions, surfaces, markers, shape.curves, caps)
+    _check_caps(named)
+    return named
+
+
+def _check_caps(mesh: Mesh) -> None:
+    """Refuse a cap with no air behind it, as over the outline of a face."""
+    least = 1e-6 * mesh.volume()
+    for name, edges in mesh.caps.items():
+        for surface, faces in mesh.surfaces.items():
+            behind = surface.startswith("cavity") and np.isin(edges, faces).all()
+            if behind and mesh.enclosed_volume(surface) < least:
+                raise InputError(
+                    "there is no air behind this rim", key=f"caps.{name}", expected="the rim of an opening"
+                )
 
 
 def untangled(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int]:

@@ -10,7 +10,7 @@ from turgor.common.units import to_internal
 from turgor.geometry import bellows, fibre_tube, honeycomb, membrane, pneunet, reinforced_tube, tube
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import actuator
-from turgor.geometry.imported import step
+from turgor.geometry.imported import step, stl
 from turgor.mesh import Mesh
 from turgor.mesh.generate import generate
 from turgor.mesh.preview import save_preview
@@ -144,4 +144,15 @@ class StepFile(step.StepFile, _Meshed):
     ------
     InputError
         On construction, if there is no such file or a rule is not well formed; on meshing, if a rule selects no face.
+    """
+
+
+class StlFile(stl.StlFile, _Meshed):
+    """A body from an STL file; ``StlFile(file="finger.stl", unit="mm", mount={"normal": (0, 0, -1)})``.
+
+    Raises
+    ------
+    InputError
+        On construction, if there is no such file or a rule is not well formed; on meshing, if the surface is broken or
+        a rule selects no face.
     """

@@ -1,108 +1,138 @@
-"""Rules that select faces of an imported solid, whose tags mean nothing to a person."""
+"""Rules that select faces and openings of an imported solid, whose tags mean nothing to a person."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Protocol, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from turgor.common.errors import InputError
-from turgor.geometry import cad
+from turgor.geometry.actuator import FloatArray
 from turgor.geometry.space import Cylinder, Direction, Place, unit
 
 
+class Part(Protocol):
+    """What rules ask of a face, or of the rim of an opening."""
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner ``(3,)`` of the box around it."""
+        ...
+
+    @property
+    def samples(self) -> FloatArray:
+        """Points of it ``(k, 3)``: its vertices, and some between them."""
+        ...
+
+    @property
+    def normals(self) -> FloatArray:
+        """Unit normals ``(k, 3)`` out of the solid; of an opening, which looks both ways, in the sense of its rim."""
+        ...
+
+    @property
+    def looks_both_ways(self) -> bool:
+        """Whether the sense of the normals means nothing."""
+        ...
+
+    def distance(self, place: Place) -> float:
+        """Return its distance in mm from a place."""
+        ...
+
+
+Some = TypeVar("Some", bound=Part)
+
+
 class Selection(BaseModel):
-    """Which faces are meant; of several rules all must hold.
+    """Which faces, or which openings, are meant; of several rules all must hold.
 
     Parameters
     ----------
     within
-        Two opposite corners of a box that holds the whole face.
+        Two opposite corners of a box that holds all of it.
     inside
-        A cylinder that holds the face's vertices and sample points.
+        A cylinder that holds its vertices and sample points.
+    between
+        Two places: all of it lies between the planes through them across the line that joins them.
     normal
-        Direction, which need not have length one, of the outward normal of a flat face.
+        Direction, which need not have length one, of the outward normal of a flat face; of an opening either way.
     angle
         Largest angle in degrees between `normal` and the face's.
+    any_of, none_of
+        Other selections: what at least one of them selects, and what none does.
     nearest
-        Of the faces that the other rules leave, the one nearest to this point.
+        Of what the other rules leave, the one nearest to this point.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     within: tuple[Place, Place] | None = None
     inside: Cylinder | None = None
+    between: tuple[Place, Place] | None = None
     normal: Direction | None = None
     angle: Annotated[float, Field(gt=0.0, lt=90.0)] = 5.0
+    any_of: tuple[Selection, ...] = ()
+    none_of: tuple[Selection, ...] = ()
     nearest: Place | None = None
 
-    def pick(self, faces: list[int], key: str) -> list[int]:
-        """Return those of the `faces` of the current model that are meant.
+    def pick(self, parts: Sequence[Some], key: str) -> list[Some]:
+        """Return those of the `parts` that are meant.
 
         Raises
         ------
         InputError
-            If there is no rule, or no face follows them; `key` names the selection.
+            If there is no rule, or nothing follows them; `key` names the selection.
         """
-        if self.within is None and self.inside is None and self.normal is None and self.nearest is None:
-            raise InputError("no rule says which faces", key=key, expected="within, inside, normal or nearest")
-        found = [face for face in faces if self._in_box(face) and self._in_cylinder(face) and self._faces_along(face)]
-        if self.nearest is not None and found:
-            point = cad.occ().addPoint(*self.nearest)
-            distances = [cad.occ().getDistance(0, point, 2, face)[0] for face in found]
-            cad.occ().remove([(0, point)])
-            found = [found[int(np.argmin(distances))]]
+        found = self._picked(parts, key)
         if not found:
-            raise InputError("no face follows these rules", key=key, value=self.model_dump(exclude_none=True))
+            rules = self.model_dump(exclude_none=True, exclude_defaults=True)
+            raise InputError("nothing follows these rules", key=key, value=rules)
         return found
 
-    def _in_box(self, face: int) -> bool:
+    def _picked(self, parts: Sequence[Some], key: str) -> list[Some]:
+        if not self.model_fields_set - {"angle"}:
+            expected = ", ".join(name for name in type(self).model_fields if name != "angle")
+            raise InputError("no rule says what is meant", key=key, expected=f"at least one of: {expected}")
+        found = list(parts)
+        for rule in (self._in_box, self._in_cylinder, self._in_slab, self._looks_along):
+            found = [part for part in found if rule(part)]
+        if self.any_of:
+            wanted = [part for other in self.any_of for part in other._picked(found, key)]
+            found = [part for part in found if any(part is one for one in wanted)]
+        for other in self.none_of:
+            refused = other._picked(found, key)
+            found = [part for part in found if not any(part is one for one in refused)]
+        if self.nearest is not None and found:
+            place = self.nearest
+            found = [min(found, key=lambda part: part.distance(place))]
+        return found
+
+    def _in_box(self, part: Part) -> bool:
         if self.within is None:
             return True
-        low, high = cad.bounds(2, face)
+        low, high = part.bounds
         corners = np.array(self.within)
         slack = 1e-6 * max(1.0, float(np.abs(corners).max()))
         return bool((low > corners.min(axis=0) - slack).all() and (high < corners.max(axis=0) + slack).all())
 
-    def _in_cylinder(self, face: int) -> bool:
-        if self.inside is None:
-            return True
-        return bool(self.inside.contains(_samples(face)).all())
+    def _in_cylinder(self, part: Part) -> bool:
+        return self.inside is None or bool(self.inside.contains(part.samples).all())
 
-    def _faces_along(self, face: int) -> bool:
+    def _in_slab(self, part: Part) -> bool:
+        if self.between is None:
+            return True
+        start, end = np.array(self.between)
+        axis = unit(tuple(end - start))
+        height, width = (part.samples - start) @ axis, float((end - start) @ axis)
+        slack = 1e-6 * max(1.0, float(np.abs(self.between).max()))
+        return bool((height > -slack).all() and (height < width + slack).all())
+
+    def _looks_along(self, part: Part) -> bool:
         if self.normal is None:
             return True
-        normals = outward_normals(face)
-        return bool((normals @ unit(self.normal) > math.cos(math.radians(self.angle))).all())
-
-
-def outward_normals(face: int) -> Any:
-    """Return the normals ``(k, 3)`` at sample points of a face of one solid, pointing out of it."""
-    gmsh = cad.kernel()
-    places = _parameters(face)
-    normals = np.array(gmsh.model.getNormal(face, places)).reshape(-1, 3)
-    # gmsh's normal follows the surface, not the solid: a short step along it tells on which side the solid lies.
-    low, high = cad.bounds(2, face)
-    step = np.array(gmsh.model.getValue(2, face, places[:2])) + 1e-4 * np.linalg.norm(high - low) * normals[0]
-    volumes, _ = gmsh.model.getAdjacencies(2, face)
-    return -normals if gmsh.model.isInside(3, volumes[0], step.tolist()) else normals
-
-
-def _samples(face: int) -> Any:
-    """Return points of a face ``(k, 3)``: its vertices, and some inside it."""
-    gmsh = cad.kernel()
-    vertices = gmsh.model.getBoundary([(2, face)], oriented=False, recursive=True)
-    points = [np.array(gmsh.model.getValue(0, tag, [])) for _, tag in vertices]
-    inner = np.array(gmsh.model.getValue(2, face, _parameters(face))).reshape(-1, 3)
-    return np.vstack([*points, inner])
-
-
-def _parameters(face: int) -> list[float]:
-    """Return u, v, u, v, … of a grid of points that lie on the trimmed face."""
-    gmsh = cad.kernel()
-    (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face)
-    grid = [(u, v) for u in np.linspace(u0, u1, 7)[1:-1] for v in np.linspace(v0, v1, 7)[1:-1]]
-    on_face = [pair for pair in grid if gmsh.model.isInside(2, face, pair, parametric=True)]
-    return [float(number) for pair in on_face or grid for number in pair]
+        cosine = part.normals @ unit(self.normal)
+        if part.looks_both_ways:
+            cosine = np.abs(cosine)
+        return bool((cosine > math.cos(math.radians(self.angle))).all())

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from turgor.common.errors import InputError
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 LEAF = 4
 """Triangles in a box that is not divided further."""
@@ -38,7 +37,7 @@ class TriangleBody:
         If the surface is not closed or encloses no volume.
     """
 
-    def __init__(self, points: Floats, triangles: Ints) -> None:
+    def __init__(self, points: Floats, triangles: NDArray[np.integer]) -> None:
         corners, same = np.unique(np.asarray(points, float), axis=0, return_inverse=True)
         faces = np.asarray(same.ravel()[np.asarray(triangles)], np.intp)
         ends = [faces[:, [i, (i + 1) % 3]] for i in range(3)]
@@ -52,7 +51,7 @@ class TriangleBody:
             raise InputError("the triangles are inside out", key="triangles", value=f"{volume:.4g} mm³ enclosed")
         self._corners = corners[faces]
         self._normals = _normals(faces, self._corners, area_normal / size[:, None], opposite, len(corners))
-        self._tree = _tree(self._corners)
+        self._tree = box_tree(self._corners)
         self._middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
 
     @classmethod
@@ -126,7 +125,7 @@ def _normals(triangles: NDArray[np.intp], corners: Floats, unit: Floats, opposit
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300))
 
 
-def _tree(corners: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+def box_tree(corners: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
     """Return boxes ``(b, 2, 3)``, their links ``(b, 2)`` and the order of the triangles ``(k,)``.
 
     The links are the two boxes inside, or, of a box that holds triangles itself, minus one less its first place
