@@ -86,6 +86,12 @@ CASES: dict[str, tuple[str, ...]] = {
     "poisson-0.6.yaml": ("materials.body.poisson", "0.6", "below 0.5"),
     "pressure-of-1e9.yaml": ("loads.0.value", "times the shear modulus", "check both units"),
     "python-tag.yaml": ("line 4", "python/object/apply:os.system", "not allowed"),
+    "region-at-least-5.yaml": ("regions.stiff.at_least", "5", "less than or equal to 4"),
+    "region-misspelt.yaml": ("regions.stiff.where.bal", "unknown key"),
+    "region-nowhere.yaml": ("regions.stiff", "no cell lies"),
+    "region-of-bare-radius.yaml": ("regions.stiff.where.any_of.0.ball.radius", "a unit is missing"),
+    "region-of-no-file.yaml": ("regions.stiff.where.stl.file", "no such file", "insert.stl"),
+    "region-of-no-rule.yaml": ("regions.stiff", "no rule says which part of space", "ball"),
     "sheet-between-unknown.yaml": ("sheets.0.between.1", "'base'", "body"),
     "sheet-nowhere.yaml": ("sheets.0", "either surface or between"),
     "sheet-poisson-1.yaml": ("sheets.0.poisson", "1.0", "less than 1"),
@@ -94,6 +100,13 @@ CASES: dict[str, tuple[str, ...]] = {
     "step-without-mount.yaml": ("geometry.mount",),
     "steps-against-each-other.yaml": ("solver.smallest_step", "more than the largest step"),
     "steps-and-outputs.yaml": ("solver", "only one of the two"),
+    "stl-cap-on-nothing.yaml": ("geometry.caps.inlet", "nothing follows these rules"),
+    "stl-cap-over-a-face.yaml": ("geometry.caps.inlet", "no air behind this rim"),
+    "stl-crossed.yaml": ("crossed.stl", "passes through itself", "near"),
+    "stl-of-furlongs.yaml": ("geometry.unit", "furlong", "inch"),
+    "stl-open-cavity.yaml": ("loads.0.cavity", "no closed cavity", "caps"),
+    "stl-rule-misspelt.yaml": ("geometry.caps.inlet.nearst",),
+    "stl-without-unit.yaml": ("geometry.unit",),
     "strain-range-of-one.yaml": ("materials.body.strain_range", "0:3"),
     "strain-range-reversed.yaml": ("materials.body.strain_range", "1:0.5", "empty"),
     "tab-indented.yaml": ("line 6", "not YAML"),
@@ -143,7 +156,7 @@ TESTS: dict[str, tuple[str, ...]] = {
 }
 """Tensile test → words that the message of ``turgor fit`` must hold."""
 
-NOT_BAD = {"good.csv", "empty.step"}
+NOT_BAD = {"good.csv", "empty.step", "crossed.stl", "cup.stl"}
 
 
 def the_message(arguments: list[str]) -> str:
@@ -166,7 +179,7 @@ def test_every_bad_file_is_listed() -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_a_malformed_case_is_refused(name: str, tmp_path: Path) -> None:
     message = the_message(["run", str(BAD / name), "--out", str(tmp_path / "out")])
-    assert name in message or "no-stress.csv" in message
+    assert name in message or "no-stress.csv" in message or "crossed.stl" in message
     for words in CASES[name]:
         assert words in message
     assert not (tmp_path / "out").exists()

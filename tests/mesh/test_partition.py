@@ -3,9 +3,10 @@ import time
 
 import numpy as np
 import pytest
+import trimesh
 
 from turgor.common.errors import InputError
-from turgor.geometry.space import Ball, Cylinder, HalfSpace, Space
+from turgor.geometry.space import Ball, Cylinder, HalfSpace, NearBody, Space
 from turgor.mesh.partition import partition
 from turgor.mesh.structured import box, shell_octant, tube_sector
 
@@ -93,3 +94,31 @@ def test_partition_is_quick():
     partition(shell, {"core": Space(ball=Ball(centre=ORIGIN, radius="1.2 mm"))})
     assert shell.n_cells > 15_000
     assert time.perf_counter() - start < 2.0
+
+
+def test_distance_to_a_body_from_an_stl_file(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
+    hollow = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
+    hollow.invert()
+    trimesh.util.concatenate([ball, hollow]).export(tmp_path / "ball.stl")
+    points = np.random.default_rng(0).uniform(-2, 2, (5000, 3))
+    radius = np.linalg.norm(points, axis=1)
+    clear = (np.abs(radius[:, None] - [0.5, 0.7, 1.0, 1.3, 0.8]) > 0.02).all(axis=1)  # away from the facets' error
+    for distance, inside in (
+        ("0 mm", (radius > 0.5) & (radius < 1.0)),
+        ("0.3 mm", (radius > 0.2) & (radius < 1.3)),
+        ("-0.2 mm", (radius > 0.7) & (radius < 0.8)),
+    ):
+        near = Space(stl=NearBody(file=str(tmp_path / "ball.stl"), unit="mm", distance=distance))
+        outer = clear & (np.abs(radius - 0.2) > 0.02)
+        np.testing.assert_array_equal(near.contains(points)[outer], inside[outer])
+
+
+def test_each_region_may_have_its_own_number_of_corners():
+    block = box((1.0, 1.0, 2.0), (2, 2, 4))
+    spaces = {"top": upper("0.9 mm"), "low": Space(none_of=(upper("0.6 mm"),))}
+    mesh = partition(block, spaces, at_least={"top": 1, "low": 4})
+    assert mesh.volume("top") == pytest.approx(partition(block, {"top": spaces["top"]}, at_least=1).volume("top"))
+    assert mesh.volume("low") == pytest.approx(0.5)
+    with pytest.raises(InputError, match="only tetrahedra"):
+        partition(box((1.0, 1.0, 1.0), (1, 1, 1), "hex27"), {"top": upper("0.5 mm")})

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from turgor.geometry.imported.selection import Selection
+from turgor.geometry.space import NearBody, Space
 from turgor.results.measures import MEASURES
 from turgor.study.boundary import DisplacementCase, ElasticCase, ForceCase, GravityCase, PressureCase, TractionCase
-from turgor.study.case import Case, MeshCase, SolverCase, load_case
+from turgor.study.case import Case, MeshCase, RegionCase, SolverCase, load_case
 from turgor.study.contact import BoxCase, ContactCase, CylinderCase, PlaneCase, SphereCase
 from turgor.study.materials import FittedMaterial, LibraryMaterial, ModelMaterial
 from turgor.study.reinforcement import (
@@ -48,6 +50,10 @@ def test_every_measure_is_on_the_page_of_results(name: str) -> None:
     [
         Case,
         MeshCase,
+        RegionCase,
+        Selection,
+        Space,
+        NearBody,
         SolverCase,
         LibraryMaterial,
         ModelMaterial,

@@ -10,7 +10,7 @@ from rich.console import Console
 
 import turgor as tg
 from turgor.cli import tables
-from turgor.cli.failure import Commands, naming, tell
+from turgor.cli.failure import Commands, naming, tell, telling_warnings
 from turgor.cli.output import print_json, print_table, print_text
 from turgor.cli.progress import progress_on
 
@@ -209,12 +209,16 @@ def mesh(
         Path | None,
         typer.Option(metavar="FILE", help="Mesh file, .msh or .vtu; the case's name with .vtu if left out."),
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.png", help="Show the named parts, or where an STL surface is broken."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Mesh the actuator of a case, write the mesh and say how good it is."""
-    with naming(case_file):
+    with naming(case_file), telling_warnings():
         case = tg.load_case(case_file, changes or ())
-        meshed = tg.mesh_case(case)
+        meshed = tg.mesh_case(case, picture)
     path = out or Path(f"{case.name}.vtu")
     tg.write_mesh(meshed, path)
     facts = tables.mesh_document(meshed, tg.mesh_quality(meshed).summary(), path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import tempfile
 import traceback
 from collections.abc import Iterator
@@ -50,6 +51,23 @@ def naming(file: Path) -> Iterator[None]:
         yield
     except tg.InputError as error:
         raise error.at(file=file) from error
+
+
+@contextlib.contextmanager
+def telling_warnings() -> Iterator[None]:
+    """Print the package's warnings on standard error while this lasts."""
+    handler = _Teller(logging.WARNING)
+    log = logging.getLogger("turgor")
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+
+
+class _Teller(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        tell(record.getMessage())
 
 
 def tell(message: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,7 +26,7 @@ COLOURS = {
 """Colour of a surface by the beginning of its name; others are grey."""
 
 _VTK_QUADRATIC_TRIANGLE = 22
-_EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity": 0.25}
+PICTURE_EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity": 0.25}
 
 
 def save_picture(
@@ -58,11 +60,12 @@ def save_picture(
     MissingPackageError
         If pyvista or a system library that it loads is absent.
     """
-    if Path(path).suffix != ".png":
-        raise InputError("a picture is saved as .png", key="path", value=str(path))
+    with drawing(path, window_size=window) as plotter:
+        _draw(plotter, mesh, show, cut)
+
+
+def _draw(plotter: Any, mesh: Mesh, show: str, cut: bool) -> None:
     pyvista = require("pyvista")
-    plotter = pyvista.Plotter(off_screen=True, window_size=window)
-    plotter.set_background("white")
     middle = mesh.points[:, 1].min() if not cut else float(mesh.points[:, 1].mean())
     surfaces = dict(mesh.surfaces) if show == "names" else {"skin": boundary_faces(mesh.cells)}
     measured = quality(mesh)
@@ -70,14 +73,14 @@ def save_picture(
         kept = triangles[mesh.points[triangles].mean(axis=1)[:, 1] >= middle]
         if len(kept) == 0:
             continue
-        skin = _skin(pyvista, mesh, kept)
+        skin = skin_of(pyvista, mesh, kept)
         if show == "quality":
             skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[host_cells(mesh.cells, kept)]
-            plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **_EDGES)
+            plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **PICTURE_EDGES)
         else:
             # Fibres run inside the wall; they show through the outside.
             opacity = 0.3 if mesh.curves and name == "outer" else 1.0
-            plotter.add_mesh(skin, color=_colour(name), label=name, opacity=opacity, **_EDGES)
+            plotter.add_mesh(skin, color=colour_of(name) or "#aaaaaa", label=name, opacity=opacity, **PICTURE_EDGES)
     if show == "quality":
         worst = measured.centres[measured.worst_cell]
         plotter.add_point_labels([worst], [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
@@ -87,11 +90,10 @@ def save_picture(
     plotter.view_vector((0.5, -1.0, 0.45), (0, 0, 1))
     extent = np.ptp(mesh.points, axis=0)
     plotter.camera.zoom(1.3 if extent[2] < extent.max() else 1.0)  # a tall body fills the height already
-    plotter.screenshot(str(path))
-    plotter.close()
 
 
-def _skin(pyvista: Any, mesh: Mesh, triangles: IntArray) -> Any:
+def skin_of(pyvista: Any, mesh: Mesh, triangles: IntArray) -> Any:
+    """Return six-node triangles of a mesh as a grid to draw."""
     cells = np.hstack([np.full((len(triangles), 1), 6), triangles]).ravel()
     return pyvista.UnstructuredGrid(cells, np.full(len(triangles), _VTK_QUADRATIC_TRIANGLE), mesh.points)
 
@@ -106,5 +108,35 @@ def _add_lines(pyvista: Any, plotter: Any, mesh: Mesh) -> None:
             plotter.add_point_labels(mesh.points[nodes], [name], always_visible=True, shape_opacity=0.6)
 
 
-def _colour(name: str) -> str:
-    return next((colour for start, colour in COLOURS.items() if name.startswith(start)), "#aaaaaa")
+def colour_of(name: str) -> str | None:
+    """Return the usual colour of a surface of this name, if it has one."""
+    return next((colour for start, colour in COLOURS.items() if name.startswith(start)), None)
+
+
+@contextlib.contextmanager
+def drawing(path: str | Path, **options: Any) -> Iterator[Any]:
+    """Open a plotter without a screen, white, and save what was drawn as a PNG file.
+
+    Raises
+    ------
+    InputError
+        If the path does not end in .png or nothing can be written there.
+    MissingPackageError
+        If pyvista or a system library that it loads is absent.
+    """
+    if Path(path).suffix != ".png":
+        raise InputError("a picture is saved as .png", key="path", value=str(path))
+    pyvista, logger = require("pyvista"), require("vtkmodules.vtkCommonCore").vtkLogger
+    # Without a screen VTK falls back to EGL by itself, but warns on the way about the X server it did not find.
+    verbosity = logger.GetCurrentVerbosityCutoff()
+    logger.SetStderrVerbosity(logger.VERBOSITY_OFF)
+    plotter = pyvista.Plotter(off_screen=True, **options)
+    try:
+        plotter.set_background("white", all_renderers=True)
+        yield plotter
+        plotter.screenshot(str(path))
+    except OSError as error:
+        raise InputError(f"the picture cannot be written: {error.strerror}", file=path) from error
+    finally:
+        plotter.close()
+        logger.SetStderrVerbosity(verbosity)

@@ -7,7 +7,7 @@ resolved ``case.yaml`` of a run's folder, which gives the same run again.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -29,7 +29,10 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength, Pressure
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import templates
+from turgor.geometry.imported.solid import ImportedSolid
 from turgor.geometry.imported.step import StepFile
+from turgor.geometry.imported.stl import StlFile
+from turgor.geometry.space import Space
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
 from turgor.study.boundary import Load, PressureCase
@@ -42,7 +45,7 @@ from turgor.study.validation import StrictModel, explain, inlined, invalid, sugg
 
 def _known() -> dict[str, type[Actuator]]:
     """Return every kind of shape by the name that it has in a case file."""
-    return {**templates(), StepFile.template: StepFile}
+    return {**templates(), **{kind.template: kind for kind in (StepFile, StlFile)}}
 
 
 def _actuator(value: object, info: ValidationInfo) -> object:
@@ -52,11 +55,11 @@ def _actuator(value: object, info: ValidationInfo) -> object:
     parameters = dict(value)
     name = parameters.pop("template", None)
     known = _known()
-    if name == StepFile.template and "file" in parameters:
-        parameters["file"] = str(in_case_folder(parameters["file"], info, "STEP", "file"))
     if not isinstance(name, str) or name not in known:
         problem = "this key is missing" if name is None else "unknown template"
         raise InputError(problem, key="geometry.template", value=name, expected=suggestion(str(name), known))
+    if issubclass(known[name], ImportedSolid) and "file" in parameters:
+        parameters["file"] = str(in_case_folder(parameters["file"], info, name.upper(), "file"))
     try:
         return known[name](**parameters)
     except InputError as error:
@@ -64,7 +67,7 @@ def _actuator(value: object, info: ValidationInfo) -> object:
 
 
 def _template_and_parameters(actuator: Actuator) -> dict[str, Any]:
-    return {"template": actuator.template, **actuator.model_dump(mode="json")}
+    return {"template": actuator.template, **actuator.model_dump(mode="json", exclude_none=True)}
 
 
 class _GeometrySchema:
@@ -93,6 +96,15 @@ class MeshCase(StrictModel):
     sizes: dict[str, PositiveLength] = Field(default={}, description="region or surface: smaller edge length there")
     per_circle: int | None = Field(
         default=None, strict=True, ge=0, le=1000, description="elements along a full circle, at least"
+    )
+
+
+class RegionCase(StrictModel):
+    """Elements that become a region of their own because of where they lie."""
+
+    where: Space = Field(description="the part of space")
+    at_least: int = Field(
+        default=4, strict=True, ge=1, le=4, description="corners of an element that lie in it, of its four"
     )
 
 
@@ -133,6 +145,7 @@ class Case(Setup):
     name: str = Field(default="case", description="the run's name and default folder; left out, the file's name")
     geometry: Geometry
     materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
+    regions: dict[str, RegionCase] = Field(default={}, description="further regions by parts of space")
     mesh: MeshCase = MeshCase()
     loads: tuple[Load, ...] = Field(min_length=1)
     largest_stretch: float = Field(
@@ -185,6 +198,16 @@ class Case(Setup):
             raise invalid("these pressures do not lead from 0 to the load's", key=key, expected=expected)
         return fractions
 
+    @property
+    def data_files(self) -> list[Path]:
+        """The files that the case names, each once: tests, measured motion and shapes."""
+        tests = [
+            path for choice in self.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit
+        ]
+        data = self.model_dump(mode="json", exclude_none=True, include={"geometry", "regions"})
+        measured = [path for choice in self.measures or () for path in choice.files]
+        return list(dict.fromkeys([*tests, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
+
     def to_yaml(self, files: Mapping[Path, str] | None = None) -> str:
         """Return the resolved case as YAML that :func:`load_case` reads back to the same case.
 
@@ -194,9 +217,8 @@ class Case(Setup):
             Data file → the path to write for it, relative to the folder the YAML will lie in.
         """
         data = self.model_dump(mode="json", exclude_none=True)
-        if isinstance(self.geometry, StepFile):
-            path = Path(self.geometry.file)
-            data["geometry"]["file"] = (files or {}).get(path, str(path))
+        for shape in _with_file([data["geometry"], data.get("regions", {})]):
+            shape["file"] = (files or {}).get(Path(shape["file"]), shape["file"])
         for region, material in self.materials.items():
             if isinstance(material, FittedMaterial):
                 data["materials"][region]["fit"] = [(files or {}).get(path, str(path)) for path in material.fit]
@@ -204,6 +226,14 @@ class Case(Setup):
             data["measures"] = [choice.plain(files) for choice in self.measures]
         data = {key: data[key] for key in _FIRST} | {key: part for key, part in data.items() if part not in ([], {})}
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+
+
+def _with_file(data: Any) -> Iterator[dict[str, Any]]:
+    """Find the mappings that name a file, at any depth."""
+    if isinstance(data, dict) and isinstance(data.get("file"), str):
+        yield data
+    for part in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _with_file(part)
 
 
 DEFAULT_STEPS = 10

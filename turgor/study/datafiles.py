@@ -5,21 +5,15 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from turgor.geometry.imported.step import StepFile
 from turgor.study.case import Case
-from turgor.study.materials import FittedMaterial
 
 FOLDER = "data"
 
 
 def data_names(case: Case) -> dict[Path, str]:
     """Return each data file of the case and the name of its copy, relative to the run's folder."""
-    paths = [path for choice in case.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit]
-    if isinstance(case.geometry, StepFile):
-        paths.append(Path(case.geometry.file))
-    paths += [path for choice in case.measures or () for path in choice.files]
     names: dict[Path, str] = {}
-    for path in dict.fromkeys(paths):
+    for path in case.data_files:
         name = f"{FOLDER}/{path.name}"
         names[path] = name if name not in names.values() else f"{FOLDER}/{len(names)}-{path.name}"
     return names

@@ -16,8 +16,11 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.common.units import from_internal
 from turgor.fem.system import System
+from turgor.geometry.imported.surface import BrokenSurfaceError
 from turgor.mesh import Mesh
 from turgor.mesh.generate import generate
+from turgor.mesh.named_parts import save_fault, save_named_parts
+from turgor.mesh.partition import partition
 from turgor.results.report import report
 from turgor.results.store import RunStore
 from turgor.results.summary import Summary, summarise
@@ -104,21 +107,48 @@ def run(
         return _Running(case, place, progress or Silent(), run_log).run(continues=stored and resume)
 
 
-def mesh_case(case: Case) -> Mesh:
+def mesh_case(case: Case, picture: str | Path | None = None) -> Mesh:
     """Return the mesh of a case, with the names that its supports and loads use made sure of.
+
+    Parameters
+    ----------
+    case
+        What to mesh.
+    picture
+        A .png file that shows which parts have which names, or, where there is no mesh because the surface of an STL
+        file is broken, where it is.
 
     Raises
     ------
     InputError
         If there is no valid mesh, or a region, surface or cavity of the case is not on it.
     """
+    try:
+        mesh = _divided(case)
+    except BrokenSurfaceError as error:
+        if picture:
+            save_fault(error.points, error.triangles, error.wrong, picture)
+        raise
+    if picture:
+        save_named_parts(mesh, picture)
+    check_names(case, mesh)
+    return mesh
+
+
+def _divided(case: Case) -> Mesh:
+    """Return the mesh of a case with its regions."""
     how = case.mesh
     try:
         mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle)
     except InputError as error:
-        about_size = error.key is not None and error.key.split(".")[0] in MeshCase.model_fields
-        raise under(error, "mesh") if about_size else error from error
-    check_names(case, mesh)
+        field = (error.key or "").split(".")[0]
+        if field in MeshCase.model_fields:
+            raise under(error, "mesh") from error
+        raise (under(error, "geometry") if field in type(case.geometry).model_fields else error) from error
+    if case.regions:
+        spaces = {name: region.where for name, region in case.regions.items()}
+        least = {name: region.at_least for name, region in case.regions.items()}
+        mesh = partition(mesh, spaces, at_least=least)
     return mesh
 
 

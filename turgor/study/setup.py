@@ -50,6 +50,13 @@ class Setup(StrictModel):
             check_name(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
         cavities = cavities_of(mesh)
         for number, load in enumerate(self.loads):
+            if isinstance(load, PressureCase) and not cavities:
+                raise InputError(
+                    "no air can be kept in this shape: it has no closed cavity",
+                    key=f"loads.{number}.cavity",
+                    value=load.cavity,
+                    expected="a closed pocket, or caps in the geometry for the openings of one",
+                )
             if isinstance(load, PressureCase):
                 check_name(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
             elif not isinstance(load, GravityCase):

@@ -31,13 +31,16 @@ class StrictModel(BaseModel):
 
 
 def inlined(schema: Any, parts: Mapping[str, Any]) -> Any:
-    """Return a JSON Schema with each reference replaced by the part that it names; no part may hold itself."""
+    """Return a JSON Schema with each reference replaced by the part that it names, inside itself by any object."""
     if isinstance(schema, list):
         return [inlined(item, parts) for item in schema]
     if not isinstance(schema, dict):
         return schema
     rest = {key: inlined(value, parts) for key, value in schema.items() if key != "$ref"}
-    return {**inlined(parts[schema["$ref"].rsplit("/", 1)[1]], parts), **rest} if "$ref" in schema else rest
+    if "$ref" not in schema:
+        return rest
+    name = schema["$ref"].rsplit("/", 1)[1]
+    return {**inlined(parts[name], {**parts, name: {"type": "object"}}), **rest}
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -93,6 +96,8 @@ def _words(finding: ErrorDetails) -> tuple[str, object, str | None]:
     kind, value, message = finding["type"], finding["input"], finding["msg"]
     if kind == "unknown_key":
         return "unknown key", None, context["expected"]
+    if kind == "extra_forbidden":
+        return "unknown key", None, None
     if kind == "missing":
         return "this key is missing", None, None
     if kind == "union_tag_invalid":

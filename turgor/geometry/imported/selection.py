@@ -92,7 +92,8 @@ class Selection(BaseModel):
         return found
 
     def _picked(self, parts: Sequence[Some], key: str) -> list[Some]:
-        if not self.model_fields_set - {"angle"}:
+        rules = (self.within, self.inside, self.between, self.normal, self.nearest)
+        if not (any(rule is not None for rule in rules) or self.any_of or self.none_of):
             expected = ", ".join(name for name in type(self).model_fields if name != "angle")
             raise InputError("no rule says what is meant", key=key, expected=f"at least one of: {expected}")
         found = list(parts)
