@@ -250,3 +250,12 @@ def test_export_refuses_what_the_program_lacks(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert "contact" in result.stderr
     assert not (tmp_path / "tube.inp").exists()
+
+
+@pytest.mark.parametrize(("model", "cells"), [("axisymmetric", "triangles"), ("quarter", "hexahedra")])
+def test_sections_and_rows_are_meshed_too(model: str, cells: str, tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "tube.yaml"
+    changes = ("--set", f"geometry.model={model}", "--set", f"mesh.cells={cells}", "--set", "mesh.size=5 mm")
+    facts = printed("mesh", example, *changes, "--out", tmp_path / "tube.vtu", "--json")
+    assert facts["elements"] > 50
+    assert (tmp_path / "tube.vtu").stat().st_size > 1000

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
+from turgor.geometry.blocks import Blocks
 from turgor.geometry.drawing import View
 from turgor.geometry.section import PlaneSection
 
@@ -120,6 +121,10 @@ class Actuator(BaseModel, ABC):
     @property
     def section(self) -> PlaneSection | None:
         """What the drawing stands for if it is plane; None for a body in space."""
+        return None
+
+    def blocks(self) -> Blocks | None:
+        """Return the section in blocks, for meshes in rows; None if the shape is not made of them."""
         return None
 
     def views(self) -> Sequence[View]:

@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.blocks import AXIS, Block, Blocks
 from turgor.geometry.drawing import Distance, Mark, Pointer, Turn, View, along
 from turgor.geometry.path import Piece, Step, offset_path
 from turgor.geometry.section import CUTS, TURN, PlaneSection
@@ -190,6 +191,27 @@ class Bellows(Actuator):
         occ.remove([(2, section)])
         body = cad.with_points(next(tag for dimension, tag in swept if dimension == 3), tip)
         return Shape({"body": [body]}, self._surfaces(cad.boundary([body])), {"base": base, "tip": tip})
+
+    def blocks(self) -> Blocks:
+        """Return the pieces of the wall, one after the other, the first one cut where the mount ends."""
+        outside, inside = self._line(-0.5 * self.wall), self._line(0.5 * self.wall)
+        cuts = (self.mount_radius, 0.0), (self.mount_radius, self.wall)
+        for line, cut in zip((outside, inside), cuts, strict=True):
+            line[:1] = [Piece(line[0].start, cut), Piece(cut, line[0].end)]
+        last = len(outside) - 1
+        parts = []
+        for number, (under, over) in enumerate(zip(outside, inside, strict=True)):
+            sides = (
+                under,
+                Piece(under.end, over.end),
+                Piece(over.end, over.start, over.centre),
+                Piece(over.start, under.start),
+            )
+            skin = {0: "mount", last: "tip-face"}.get(number, "outer")
+            names = (skin, AXIS if number == last else None, "cavity", "cavity" if number == 0 else None)
+            parts.append(Block("body", sides, names))
+        tip, base = np.array([[0.0, 0.0, self.height]]), np.array([[self.inlet_radius, 0.0, 0.0]])
+        return Blocks(parts, {"base": base, "tip": tip})
 
     def _surfaces(self, faces: list[int], dimension: int = 3) -> dict[str, list[int]]:
         cuts = {name: cad.faces_in_plane(faces, axis, 0.0, dimension) for name, axis in CUTS[self.model].items()}

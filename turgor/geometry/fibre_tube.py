@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.blocks import Blocks, capped_tube
 from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, Turn, View, circle, rectangle
 
 _THESIS = "Geer, Coiling motion of plant-inspired soft actuators (2019), section 2.2"
@@ -130,7 +131,7 @@ class FibreTube(Actuator):
         (inner,), _ = occ.cut([cad.cylinder(0.0, self.length, between)], [air])
         hole = cad.cylinder(0.0, self.length, between)
         (outer,), _ = occ.cut([cad.cylinder(0.0, self.length, outside)], [hole])
-        ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        ends = np.vstack([self._markers()["base"], self._markers()["tip"]])
         _, pieces = occ.fragment([inner, outer], [(0, occ.addPoint(*end)) for end in ends])
         occ.synchronize()
         regions = {
@@ -140,9 +141,20 @@ class FibreTube(Actuator):
         return Shape(
             regions=regions,
             surfaces=cad.named_skin(cad.boundary(tags), "z", self.length, {}),
-            markers={"base": ends[:1], "tip": ends[1:], "centreline": ends + np.array([outside, 0.0, 0.0])},
+            markers=self._markers(),
             curves=self._curves(),
         )
+
+    def _markers(self) -> dict[str, FloatArray]:
+        ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        outside = np.array([self.fibre_radius + self.outer_layer, 0.0, 0.0])
+        return {"base": ends[:1], "tip": ends[1:], "centreline": ends + outside}
+
+    def blocks(self) -> Blocks:
+        """Return the caps' middles and both layers."""
+        radii = (0.5 * self.inner_diameter, self.fibre_radius, self.fibre_radius + self.outer_layer)
+        parts = capped_tube(radii, ("inner-layer", "inner-layer", "outer-layer"), self.cap, self.length)
+        return Blocks(parts, self._markers(), self._curves())
 
     def _curves(self) -> dict[str, FloatArray]:
         curves = {}

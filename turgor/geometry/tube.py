@@ -9,7 +9,8 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength
 from turgor.geometry import cad
-from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
+from turgor.geometry.blocks import Blocks, capped_tube
 from turgor.geometry.drawing import AIR, Distance, View, circle, rectangle
 from turgor.geometry.path import polygon
 from turgor.geometry.section import CUTS, TURN, PlaneSection
@@ -83,18 +84,27 @@ class CappedTube(Actuator):
     def draw(self) -> Shape:
         """Draw the section, or the outer cylinder less the inner one."""
         flat = self.model == "axisymmetric"
-        outside = self.inner_radius + self.wall
-        ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        ends = np.vstack([self._markers()["base"], self._markers()["tip"]])
         body = cad.with_points(self._face() if flat else self._solid(), ends, 2 if flat else 3)
         boundary = cad.boundary([body], 2 if flat else 3)
-        # OpenCASCADE's seam of the cylinder is the edge that carries the nodes of the centreline.
-        lines = {"base": ends[:1], "tip": ends[1:], "centreline": ends + np.array([outside, 0.0, 0.0])}
+        lines = self._markers()
         return Shape(
             regions={"body": [body]},
             surfaces=cad.named_skin(boundary, "z", self.length, CUTS[self.model], 2 if flat else 3),
             markers={name: line[:, [0, 2]] if flat else line for name, line in lines.items()},
             dimension=2 if flat else 3,
         )
+
+    def _markers(self) -> dict[str, FloatArray]:
+        ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, self.length]])
+        # OpenCASCADE's seam of the cylinder is the edge that carries the nodes of the centreline.
+        seam = ends + np.array([self.inner_radius + self.wall, 0.0, 0.0])
+        return {"base": ends[:1], "tip": ends[1:], "centreline": seam}
+
+    def blocks(self) -> Blocks:
+        """Return the caps' middles and the wall."""
+        radii = (self.inner_radius, self.inner_radius + self.wall)
+        return Blocks(capped_tube(radii, ("body", "body"), self.cap, self.length), self._markers())
 
     def _solid(self) -> int:
         outside, turn = self.inner_radius + self.wall, TURN[self.model]

@@ -13,9 +13,11 @@ from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, Shape
+from turgor.mesh.blocks import structured_mesh
 from turgor.mesh.cells import CELLS, body_cell
 from turgor.mesh.faces import outward_faces
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.polyline import nodes_on_polyline
 from turgor.mesh.tet10 import FloatArray, IntArray, jacobian_coefficients
 
 LOG = logger("mesh")
@@ -28,6 +30,9 @@ MOST_CELLS = 3_000_000
 
 PER_CIRCLE_OF_SECTION = 16
 """Elements along a full circle of a section by default, whatever the template takes in space."""
+
+KINDS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra")}
+"""Number of coordinates → the cells that gmsh cuts any shape into, and those of shapes made of blocks."""
 
 LEAST_DISTORTION = 0.1
 """Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
@@ -45,9 +50,12 @@ def generate(
     *,
     sizes: Mapping[str, float] | None = None,
     per_circle: int | None = None,
+    cells: str | None = None,
     progress: Progress = LOG.info,
 ) -> Mesh:
     """Mesh an actuator with curved ten-node tetrahedra, or a section with six-node triangles, all of them valid.
+
+    Where the template allows it, also with 27-node hexahedra or nine-node quadrilaterals in rows.
 
     The same actuator and size give the same mesh to the last bit on the same machine and version of gmsh.
 
@@ -62,6 +70,9 @@ def generate(
         are refined with `size` and hold where none is given here.
     per_circle
         Elements along a full circle, at least; 0 lets them be as long as `size`. Left out, the template's own.
+    cells
+        ``tetrahedra`` or ``hexahedra``, of a section ``triangles`` or ``quadrilaterals``; left out, the first of
+        the two. The second come in rows, for shapes that are made of blocks; their Jacobian is positive at every node.
     progress
         Called with the name of each stage; the default logs it.
 
@@ -74,7 +85,8 @@ def generate(
     Raises
     ------
     InputError
-        If a size is not positive, names nothing or would fill the memory, or if gmsh finds no valid mesh.
+        If a size is not positive, names nothing or would fill the memory, if gmsh finds no valid mesh, or if the shape
+        is not made of blocks and is to be meshed so.
     MissingPackageError
         If gmsh or a system library that it loads is absent.
     """
@@ -83,6 +95,13 @@ def generate(
     for key, value in {"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}}.items():
         if not (np.isfinite(value) and value > 0.0):
             raise InputError("the element size must be positive", key=key, value=value)
+    kinds = KINDS[2 if actuator.section else 3]
+    if cells is not None and cells not in kinds:
+        problem = "a plane shape has no such cells" if actuator.section else "a shape in space has no such cells"
+        raise InputError(problem, key="cells", value=cells, expected=" or ".join(kinds))
+    if cells == kinds[1]:
+        progress(f"meshing in rows with elements of {chosen:g} mm")
+        return _structured(actuator, chosen, sizes, per_circle)
     with cad.session(actuator.template) as gmsh:
         progress("drawing")
         shape = actuator.draw()
@@ -96,6 +115,19 @@ def generate(
         _divide(gmsh, chosen, circle, shape.dimension)
         progress("curving")
         return _named_mesh(gmsh, shape, _curved(gmsh, shape))
+
+
+def _structured(actuator: Actuator, size: float, sizes: Mapping[str, float] | None, per_circle: int | None) -> Mesh:
+    blocks = actuator.blocks()
+    if blocks is None:
+        raise InputError(
+            "this shape is not made of blocks", key="cells", expected=KINDS[2 if actuator.section else 3][0]
+        )
+    if sizes:
+        raise InputError("a mesh in rows has one size", key="sizes", expected="no sizes by region or surface")
+    model = str(actuator.model_dump().get("model", "full"))
+    usual = PER_CIRCLE_OF_SECTION if actuator.section else actuator.per_circle
+    return structured_mesh(blocks, model, size, usual if per_circle is None else per_circle, MOST_CELLS // 8)
 
 
 @dataclass(frozen=True)
@@ -264,33 +296,3 @@ def _is_spoilt(nodes: FloatArray) -> npt.NDArray[np.bool_]:
     coefficients = jacobian_coefficients(nodes)
     spoilt: npt.NDArray[np.bool_] = coefficients.min(axis=1) < LEAST_DISTORTION * np.abs(coefficients).max(axis=1)
     return spoilt
-
-
-def nodes_on_polyline(points: FloatArray, line: FloatArray, name: str) -> IntArray:
-    """Return the nodes on a polyline in order from its first point to its last.
-
-    Parameters
-    ----------
-    points
-        Shape ``(n, d)``.
-    line
-        Shape ``(k, d)``; a single point asks for the node there.
-    name
-        For the message.
-
-    Raises
-    ------
-    InputError
-        If no node lies on it.
-    """
-    tolerance = 1e-6 * float(np.ptp(points, axis=0).max())
-    starts, ends = (line, line) if len(line) == 1 else (line[:-1], line[1:])
-    found: list[int] = []
-    for start, end in zip(starts, ends, strict=True):
-        along = end - start
-        fraction = np.clip((points - start) @ along / max(along @ along, 1e-300), 0.0, 1.0)
-        near = np.flatnonzero(np.linalg.norm(points - start - fraction[:, None] * along, axis=1) < tolerance)
-        found += [int(node) for node in near[np.argsort(fraction[near])] if node not in found[-1:]]
-    if not found:
-        raise InputError("no node of the mesh lies on this marker", key=name, value=line.tolist())
-    return np.array(found, dtype=np.int32)

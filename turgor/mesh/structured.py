@@ -45,7 +45,7 @@ def box(lengths: tuple[float, float, float], divisions: tuple[int, int, int], ce
         If a length is not positive or a division is less than one.
     """
     _check_lengths(lengths)
-    unit, cells = _grid(divisions, cell_type)
+    unit, cells = unit_grid(divisions, cell_type)
     x, y, z = unit.T
     sides = {"x0": x == 0, "x1": x == 1, "y0": y == 0, "y1": y == 1, "z0": z == 0, "z1": z == 1}
     return _named_mesh(unit * lengths, cells, sides)
@@ -77,7 +77,7 @@ def tube_sector(inner_radius: float, outer_radius: float, length: float, n: int,
     if length <= 0.0:
         raise InputError("the length must be positive", key="length", value=length)
     around = max(1, round(math.pi / 4 * (inner_radius + outer_radius) / wall))
-    unit, cells = _grid((n, n * around, n * max(1, round(length / wall))), cell_type)
+    unit, cells = unit_grid((n, n * around, n * max(1, round(length / wall))), cell_type)
     s, t, z = unit.T
     across = _arc(inner_radius + wall * s, t)
     sides = {"inner": s == 0, "outer": s == 1, "x0": t == 1, "y0": t == 0, "z0": z == 0, "z1": z == 1}
@@ -110,7 +110,7 @@ def shell_octant(inner_radius: float, outer_radius: float, n: int, cell_type: st
     """
     wall = _wall(inner_radius, outer_radius)
     along = n * max(1, round(math.pi / 8 * (inner_radius + outer_radius) / wall))
-    unit, cells = _grid((n, along, along), cell_type)
+    unit, cells = unit_grid((n, along, along), cell_type)
     tangents = np.tan(0.25 * math.pi * unit[:, 1:])
     tangents[unit[:, 1:] == 1.0] = 1.0
     direction = np.column_stack([np.ones(len(unit)), tangents])
@@ -160,7 +160,7 @@ def rectangle(
         If a length is not positive or a division is less than one.
     """
     _check_lengths(lengths)
-    unit, cells = _grid(divisions, cell_type)
+    unit, cells = unit_grid(divisions, cell_type)
     x, y = unit.T
     return _named_mesh(
         np.array(corner) + unit * lengths, cells, {"x0": x == 0, "x1": x == 1, "y0": y == 0, "y1": y == 1}
@@ -185,7 +185,7 @@ def quadrilateral(corners: npt.ArrayLike, divisions: tuple[int, int], cell_type:
         Surfaces ``x0 x1 y0 y1``: the sides from the fourth to the first corner, from the second to the third, from the
         first to the second, and from the third to the fourth.
     """
-    unit, cells = _grid(divisions, cell_type)
+    unit, cells = unit_grid(divisions, cell_type)
     (x, y), (a, b, c, d) = unit.T[:, :, None], np.asarray(corners, dtype=float)
     points = (1 - x) * (1 - y) * a + x * (1 - y) * b + x * y * c + (1 - x) * y * d
     x, y = unit.T
@@ -216,7 +216,7 @@ def quarter_ring(inner_radius: float, outer_radius: float, n: int, cell_type: st
     """
     wall = _wall(inner_radius, outer_radius)
     around = max(1, round(math.pi / 4 * (inner_radius + outer_radius) / wall))
-    unit, cells = _grid((n, n * around), cell_type)
+    unit, cells = unit_grid((n, n * around), cell_type)
     s, t = unit.T
     points = _arc(inner_radius + wall * s, t)
     return _named_mesh(points, cells, {"inner": s == 0, "outer": s == 1, "x0": t == 1, "y0": t == 0})
@@ -240,8 +240,8 @@ def _wall(inner_radius: float, outer_radius: float) -> float:
     return outer_radius - inner_radius
 
 
-def _grid(divisions: tuple[int, ...], cell_type: str) -> tuple[FloatArray, IntArray]:
-    """Nodes in the unit cube or square ``(n, d)`` and cells ``(m, n_nodes)``."""
+def unit_grid(divisions: tuple[int, ...], cell_type: str) -> tuple[FloatArray, IntArray]:
+    """Return the nodes in the unit cube or square ``(n, d)`` and the cells ``(m, n_nodes)`` of a grid."""
     d = len(divisions)
     kinds = [name for name, cell in CELLS.items() if cell.dimension == d]
     if cell_type not in kinds:

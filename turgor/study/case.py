@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import yaml
 from pydantic import (
@@ -96,6 +96,9 @@ class MeshCase(StrictModel):
     sizes: dict[str, PositiveLength] = Field(default={}, description="region or surface: smaller edge length there")
     per_circle: int | None = Field(
         default=None, strict=True, ge=0, le=1000, description="elements along a full circle, at least"
+    )
+    cells: Literal["tetrahedra", "hexahedra", "triangles", "quadrilaterals"] | None = Field(
+        default=None, description="left out, tetrahedra or triangles; the others where the shape is made of blocks"
     )
 
 

@@ -139,7 +139,7 @@ def _divided(case: Case) -> Mesh:
     """Return the mesh of a case with its regions."""
     how = case.mesh
     try:
-        mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle)
+        mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells)
     except InputError as error:
         field = (error.key or "").split(".")[0]
         if field in MeshCase.model_fields:

@@ -21,7 +21,12 @@ class _Meshed(Actuator):
     """What the Python story adds to a template: the way to its mesh."""
 
     def mesh(
-        self, size: str | None = None, *, sizes: Mapping[str, str] | None = None, per_circle: int | None = None
+        self,
+        size: str | None = None,
+        *,
+        sizes: Mapping[str, str] | None = None,
+        per_circle: int | None = None,
+        cells: str | None = None,
     ) -> Mesh:
         """Mesh the actuator.
 
@@ -33,6 +38,9 @@ class _Meshed(Actuator):
             Smaller edge lengths by the name of a region or surface.
         per_circle
             Elements along a full circle, at least; left out, the template's own default.
+        cells
+            ``hexahedra`` or, of a section, ``quadrilaterals``, where the shape is made of blocks; left out, tetrahedra
+            or triangles.
 
         Raises
         ------
@@ -41,7 +49,7 @@ class _Meshed(Actuator):
         """
         local = {name: to_internal(text, "length", key=f"sizes.{name}") for name, text in (sizes or {}).items()}
         whole = None if size is None else to_internal(size, "length", key="size")
-        return generate(self, whole, sizes=local, per_circle=per_circle)
+        return generate(self, whole, sizes=local, per_circle=per_circle, cells=cells)
 
 
 def preview(name: str, path: str | Path, changes: Sequence[str] = ()) -> None:
