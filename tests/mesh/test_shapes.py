@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from turgor.common.errors import InputError
 from turgor.geometry.catalogue import actuator, templates
+from turgor.geometry.chamber import Chamber
+from turgor.geometry.pneunet import PneuNet
 from turgor.mesh.cells import determinants, jacobians
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.generate import generate
@@ -247,6 +249,14 @@ def test_a_section_turned_about_its_axis_is_the_body(name):
     radius = nodes[:, :, 0] @ cell.shape_at_quadrature.T
     turned = 2 * math.pi * (radius * determinants(jacobians(nodes, cell))) @ cell.weights
     assert turned.sum() == pytest.approx(EXACT[name](shape.changed(model="full"))[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("section", ["triangle", "half-round"])
+def test_sides_that_just_meet_end_in_a_line(section):
+    sizes = {"chamber_width": "3 mm", "chamber_height": "3.562 mm", "side_wall": "1 mm", "tunnel_width": "1 mm"}
+    top = f"{Chamber(section, 3.0, 3.562, 1.0, 1.0).thickest_top!r} mm"
+    finger = PneuNet(cross_section=section, chambers=1, top_wall=top, tunnel_height="1 mm", **sizes)
+    assert_exact(finger, generate(finger), 1e-2)
 
 
 def test_the_parts_of_a_section_are_as_long_as_they_should_be():

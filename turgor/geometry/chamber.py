@@ -78,14 +78,14 @@ class Chamber:
             return self._arched(half, bottom, top)
         ridge = half
         if self.shape == "triangle":
-            ridge = max(half - top / math.tan(self.slope), 0.0)
+            ridge = _or_none(half - top / math.tan(self.slope), half)
         corners = [(-half, bottom), (half, bottom), (half, 0.0), (ridge, top), (-ridge, top), (-half, 0.0)]
         return polygon(corners)
 
     def _arched(self, radius: float, bottom: float, top: float) -> list[Piece]:
         """Return upright sides under a half circle that is cut off flat at `top`."""
         centre = (0.0, self._spring)
-        ridge = math.sqrt(max(radius**2 - (top - self._spring) ** 2, 0.0))
+        ridge = _or_none(math.sqrt(max(radius**2 - (top - self._spring) ** 2, 0.0)), radius)
         return [
             Piece((-radius, bottom), (radius, bottom)),
             Piece((radius, bottom), (radius, self._spring)),
@@ -94,3 +94,8 @@ class Chamber:
             Piece((-ridge, top), (-radius, self._spring), centre),
             Piece((-radius, self._spring), (-radius, bottom)),
         ]
+
+
+def _or_none(ridge: float, width: float) -> float:
+    """Return half of the width of a ridge, or 0 where it is no more than rounding leaves of a sharp one."""
+    return ridge if ridge > 1e-6 * width else 0.0
