@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from turgor.materials.library import library
     from turgor.materials.registry import create as material
     from turgor.materials.registry import models
+    from turgor.mesh.files import read as read_mesh
     from turgor.mesh.files import write as write_mesh
     from turgor.mesh.mesh import Mesh
     from turgor.mesh.quality import quality as mesh_quality
@@ -79,6 +80,7 @@ __all__ = [
     "mesh_quality",
     "models",
     "preview",
+    "read_mesh",
     "read_tests",
     "run",
     "template",
@@ -95,7 +97,7 @@ _HOMES = {
     "turgor.materials.fit": ("fit",),
     "turgor.materials.library": ("find_material", "library"),
     "turgor.materials.registry": ("material", "models"),
-    "turgor.mesh.files": ("write_mesh",),
+    "turgor.mesh.files": ("read_mesh", "write_mesh"),
     "turgor.mesh.mesh": ("Mesh",),
     "turgor.mesh.quality": ("mesh_quality",),
     "turgor.study.api": ("Model",),
@@ -121,7 +123,13 @@ _HOMES = {
 }
 """Module → the public names that it defines."""
 
-_RENAMED = {"find_material": "find", "material": "create", "mesh_quality": "quality", "write_mesh": "write"}
+_RENAMED = {
+    "find_material": "find",
+    "material": "create",
+    "mesh_quality": "quality",
+    "read_mesh": "read",
+    "write_mesh": "write",
+}
 """Public name → its name at home, where the two differ."""
 
 

@@ -1,3 +1,4 @@
+import meshio
 import numpy as np
 import pytest
 
@@ -85,3 +86,14 @@ def test_absent_and_unknown_files_are_refused(mesh, tmp_path):
         write(mesh, tmp_path / "mesh.obj")
     with pytest.raises(InputError, match="the mesh cannot be written"):
         write(mesh, tmp_path / "no" / "folder.vtu")
+
+
+def test_a_vtk_file_holds_straight_cells_and_their_regions(mesh, tmp_path):
+    write(mesh, tmp_path / "mesh.vtk")
+    assert (tmp_path / "mesh.vtk").read_text().startswith("# vtk DataFile Version 4.2")
+    stored = meshio.read(tmp_path / "mesh.vtk")
+    (block,) = stored.cells
+    assert block.type == "tetra"
+    np.testing.assert_allclose(stored.points[block.data], mesh.points[mesh.cells[:, :4]], atol=1e-12)
+    (region,) = stored.cell_data["region"]
+    np.testing.assert_array_equal(np.flatnonzero(region == 1), mesh.region("base"))

@@ -207,7 +207,7 @@ def mesh(
     changes: Changes = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Mesh file, .msh or .vtu; the case's name with .vtu if left out."),
+        typer.Option(metavar="FILE", help="Mesh file, .msh, .vtu or .vtk; the case's name with .vtu if left out."),
     ] = None,
     picture: Annotated[
         Path | None,

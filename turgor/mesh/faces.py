@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from turgor.common.errors import InputError
 from turgor.mesh.cells import Ints, body_cell, face_cell
@@ -68,17 +70,37 @@ def outward_faces(cells: Ints, corners: Ints) -> Ints:
         If a face is not on the boundary of the mesh.
     """
     boundary = boundary_faces(cells)
-    own = _keys(boundary)
-    wanted = np.sort(corners.reshape(-1, own.shape[1]), axis=1)
-    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
-    face_of = np.full(inverse.max(initial=-1) + 1, -1, dtype=np.int64)
-    face_of[inverse[: len(boundary)]] = np.arange(len(boundary))
-    found = face_of[inverse[len(boundary) :]]
+    found = places_of_faces(boundary, corners)
     if (found < 0).any():
-        nodes = wanted[np.argmax(found < 0)].tolist()
+        nodes = np.sort(corners.reshape(len(found), -1)[np.argmax(found < 0)]).tolist()
         what = {2: "edge", 3: "triangle", 4: "quadrilateral"}[len(nodes)]
         raise InputError(f"the {what} of nodes {nodes} is not a face on the boundary of the mesh")
     return boundary[found]
+
+
+def places_of_faces(faces: Ints, corners: Ints) -> Ints:
+    """Return which of the `faces` has each set of corner nodes ``(k, corners_per_face)``, in any order; −1 for none."""
+    own = _keys(faces)
+    wanted = np.sort(corners.reshape(-1, own.shape[1]), axis=1)
+    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
+    face_of = np.full(inverse.max(initial=-1) + 1, -1, dtype=np.int32)
+    face_of[inverse[: len(faces)]] = np.arange(len(faces))
+    found: Ints = face_of[inverse[len(faces) :]]
+    return found
+
+
+def connected_faces(faces: Ints) -> list[Ints]:
+    """Group the faces that hang together by their sides: the places of each group's faces, by their first face."""
+    sides = face_cell(faces).faces
+    ends = np.sort(faces[:, sides].reshape(len(faces) * len(sides), -1)[:, :2], axis=1)
+    _, side = np.unique(ends, axis=0, return_inverse=True)
+    face = np.repeat(np.arange(len(faces)), len(sides))
+    # A graph of faces and sides together, for the faces that share a side.
+    graph = sp.coo_matrix((np.ones(len(face)), (face, len(faces) + side)), shape=[len(faces) + side.max() + 1] * 2)
+    _, label = connected_components(graph, directed=False)
+    label = label[: len(faces)]
+    order = np.argsort(label, kind="stable").astype(np.int32)
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
 def rim_edges(faces: Ints) -> Ints:

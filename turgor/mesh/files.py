@@ -1,4 +1,4 @@
-"""Mesh files: write and read a mesh with all its names, as gmsh's .msh or VTK's .vtu.
+"""Mesh files: write and read a mesh with all its names, as gmsh's .msh or VTK's .vtu; read those of other programs.
 
 In a file a region is a set of cells, a surface of their faces, a cap of edges, a marker of vertices and a curve of
 lines between points of its own; a plane mesh lies in the plane of x and y. In gmsh's format each is a physical group
@@ -18,8 +18,11 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.mesh.cells import body_cell, face_cell, is_body_cell
+from turgor.mesh.elevate import KINDS
 from turgor.mesh.faces import outward_faces
+from turgor.mesh.inp import read_inp
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.raw import RawMesh, assembled
 from turgor.mesh.tet10 import FloatArray, IntArray
 
 # Number of nodes of a cell or face → what it is called in meshio, and its dimension.
@@ -34,6 +37,9 @@ _TYPES = {
 }
 _KIND_OF_DIMENSION = {3: "region", 2: "surface", 1: "curve", 0: "marker"}
 
+_OF_MATERIALS = ("gmsh:physical", "region", "regions", "material", "materials", "materialid", "materialids", "part")
+"""Cell arrays, in small letters, by which programs tell materials apart."""
+
 Sets = dict[tuple[str, str], IntArray]
 """Kind and name of each set → nodes of its cells, one row a cell."""
 
@@ -44,7 +50,10 @@ def meshio_name(cells: IntArray) -> str:
 
 
 def write(mesh: Mesh, path: str | Path) -> None:
-    """Write a mesh with its names to a .msh (gmsh 2.2, binary) or .vtu file.
+    """Write a mesh with its names to a .msh (gmsh 2.2, binary) or .vtu file, or its regions to a .vtk one.
+
+    A .vtk (VTK's old format, as text) is for SOFA and others that know straight cells only: it holds the corners, and
+    the cell array ``region`` that counts the regions from 0 in their order.
 
     Raises
     ------
@@ -52,16 +61,21 @@ def write(mesh: Mesh, path: str | Path) -> None:
         If the suffix is another one or the file cannot be written.
     """
     path = Path(path)
-    writer, _ = _format(path)
-    points, sets = _to_sets(mesh)
+    writer = None if path.suffix == ".vtk" else _format(path)[0]
     try:
-        writer(path, points, sets)
+        if writer:
+            writer(path, *_to_sets(mesh))
+        else:
+            _write_vtk(path, mesh)
     except OSError as error:
         raise InputError(f"the mesh cannot be written: {error.strerror}", file=path) from error
 
 
 def read(path: str | Path) -> Mesh:
-    """Read a mesh with its names from a .msh or .vtu file of second-order cells.
+    """Read a mesh with its names from a .msh, .vtu or .inp file, of Turgor's own or another program's.
+
+    Of another program's file the names come from its sets (:func:`turgor.mesh.raw.assembled`); linear cells are taken
+    for cells of second order with straight edges, which a warning says.
 
     Raises
     ------
@@ -69,19 +83,39 @@ def read(path: str | Path) -> Mesh:
         If the file is absent, of another kind, damaged, or holds no valid mesh.
     """
     path = Path(path)
-    _, reader = _format(path)
+    if path.suffix != ".inp":
+        _format(path)
     if not path.is_file():
         raise InputError("there is no such file", file=path)
     try:
-        points, sets = reader(path)
+        return assembled(read_inp(path)) if path.suffix == ".inp" else _read_by_meshio(path)
     except InputError as error:
         raise error.at(file=path) from error
-    except Exception as error:  # meshio's parsers fail in as many ways as a file can be damaged
+    except Exception as error:  # parsers fail in as many ways as a file can be damaged
         raise InputError(f"this is not a readable mesh file: {error}", file=path) from error
-    try:
-        return _from_sets(points, sets)
-    except InputError as error:
-        raise error.at(file=path) from error
+
+
+def _read_by_meshio(path: Path) -> Mesh:
+    stored = {".msh": meshio.gmsh, ".vtu": meshio.vtu}[path.suffix].read(path)
+    own = [*stored.field_data, *stored.cell_data]
+    if any(name.startswith("region:") for name in own):
+        _, reader = _format(path)
+        return _from_sets(*reader(stored))
+    return assembled(raw_mesh(stored))
+
+
+def raw_mesh(stored: meshio.Mesh) -> RawMesh:
+    """Return what another program wrote: physical groups of a .msh, a .vtu's array of numbers of materials."""
+    points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
+    blocks = [(block.type, np.asarray(block.data, dtype=np.int32)) for block in stored.cells]
+    arrays = {name.lower(): np.concatenate(parts) for name, parts in stored.cell_data.items()}
+    chosen = next((arrays[name] for name in _OF_MATERIALS if name in arrays), None)
+    if chosen is None or chosen.dtype.kind not in "iu":
+        return RawMesh(points, blocks)
+    labels = {int(number): name for name, (number, _) in stored.field_data.items()}
+    numbers = [int(number) for number in np.unique(chosen) if number or "gmsh:physical" not in arrays]
+    sets = {labels.get(k, f"region {k}"): np.flatnonzero(chosen == k).astype(np.int32) for k in numbers}
+    return RawMesh(points, blocks, sets)
 
 
 def _to_sets(mesh: Mesh) -> tuple[FloatArray, Sets]:
@@ -150,8 +184,7 @@ def _write_msh(path: Path, points: FloatArray, sets: Sets) -> None:
     meshio.gmsh.write(path, meshio.Mesh(points, blocks, cell_data=data, field_data=names), "2.2", binary=True)
 
 
-def _read_msh(path: Path) -> tuple[FloatArray, Sets]:
-    stored = meshio.gmsh.read(path)
+def _read_msh(stored: meshio.Mesh) -> tuple[FloatArray, Sets]:
     known = dict(_TYPES.values())
     sets: Sets = {}
     for label, (number, dimension) in stored.field_data.items():
@@ -176,8 +209,18 @@ def _write_vtu(path: Path, points: FloatArray, sets: Sets) -> None:
     meshio.vtu.write(path, meshio.Mesh(points, blocks, cell_data=data))
 
 
-def _read_vtu(path: Path) -> tuple[FloatArray, Sets]:
-    stored = meshio.vtu.read(path)
+def _write_vtk(path: Path, mesh: Mesh) -> None:
+    corners, cells = np.unique(mesh.cells[:, : mesh.cell.n_corners], return_inverse=True)
+    kind = next(name for name, kind in KINDS.items() if kind.cell == mesh.cell_type and kind.linear)
+    region = np.empty(mesh.n_cells, dtype=np.int32)
+    for number, members in enumerate(mesh.regions.values()):
+        region[members] = number
+    points = np.pad(mesh.points[corners], ((0, 0), (0, 3 - mesh.dimension)))
+    stored = meshio.Mesh(points, [(kind, cells.reshape(mesh.n_cells, -1))], cell_data={"region": [region]})
+    meshio.vtk.write(path, stored, fmt_version="4.2", binary=False)
+
+
+def _read_vtu(stored: meshio.Mesh) -> tuple[FloatArray, Sets]:
     sets: Sets = {}
     for array, values in stored.cell_data.items():
         kind, _, name = array.partition(":")
@@ -191,7 +234,7 @@ def _read_vtu(path: Path) -> tuple[FloatArray, Sets]:
 
 
 Writer = Callable[[Path, FloatArray, Sets], None]
-Reader = Callable[[Path], tuple[FloatArray, Sets]]
+Reader = Callable[[meshio.Mesh], tuple[FloatArray, Sets]]
 _FORMATS: dict[str, tuple[Writer, Reader]] = {".msh": (_write_msh, _read_msh), ".vtu": (_write_vtu, _read_vtu)}
 
 

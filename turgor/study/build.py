@@ -53,10 +53,11 @@ def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
                 key=f"materials.{region}.density",
                 expected="a density with its unit, such as '1070 kg/m^3'",
             )
-    coarsest = case.geometry.default_size
     sizes = {"size": case.mesh.size, **{f"sizes.{name}": size for name, size in case.mesh.sizes.items()}}
-    for key, size in sizes.items():
-        if size is not None and size < coarsest / MOST_ELEMENTS_PER_WALL:
+    given = {key: size for key, size in sizes.items() if size is not None}
+    coarsest = case.geometry.default_size if given else 0.0
+    for key, size in given.items():
+        if size < coarsest / MOST_ELEMENTS_PER_WALL:
             raise InputError(
                 f"this is more than {MOST_ELEMENTS_PER_WALL} elements through the thinnest wall",
                 key=f"mesh.{key}",

@@ -29,6 +29,7 @@ from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength, Pressure
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import templates
+from turgor.geometry.imported.mesh_file import MeshFile
 from turgor.geometry.imported.solid import ImportedSolid
 from turgor.geometry.imported.step import StepFile
 from turgor.geometry.imported.stl import StlFile
@@ -45,7 +46,7 @@ from turgor.study.validation import StrictModel, explain, inlined, invalid, sugg
 
 def _known() -> dict[str, type[Actuator]]:
     """Return every kind of shape by the name that it has in a case file."""
-    return {**templates(), **{kind.template: kind for kind in (StepFile, StlFile)}}
+    return {**templates(), **{kind.template: kind for kind in (StepFile, StlFile, MeshFile)}}
 
 
 def _actuator(value: object, info: ValidationInfo) -> object:
@@ -58,8 +59,9 @@ def _actuator(value: object, info: ValidationInfo) -> object:
     if not isinstance(name, str) or name not in known:
         problem = "this key is missing" if name is None else "unknown template"
         raise InputError(problem, key="geometry.template", value=name, expected=suggestion(str(name), known))
-    if issubclass(known[name], ImportedSolid) and "file" in parameters:
-        parameters["file"] = str(in_case_folder(parameters["file"], info, name.upper(), "file"))
+    if issubclass(known[name], (ImportedSolid, MeshFile)) and "file" in parameters:
+        kind = name if name == MeshFile.template else name.upper()
+        parameters["file"] = str(in_case_folder(parameters["file"], info, kind, "file"))
     try:
         return known[name](**parameters)
     except InputError as error:
@@ -172,6 +174,14 @@ class Case(Setup):
         if len(set(cavities)) < len(cavities):
             raise invalid("a cavity is given two pressures", key="loads", expected="one pressure for each cavity")
         self.fractions()
+        return self
+
+    @model_validator(mode="after")
+    def _a_mesh_file_has_its_size(self) -> Self:
+        given = [key for key in MeshCase.model_fields if getattr(self.mesh, key) not in (None, {})]
+        if isinstance(self.geometry, MeshFile) and given:
+            problem = "the mesh comes from a file, whose elements have their size"
+            raise invalid(problem, key=f"mesh.{given[0]}", expected="no mesh keys")
         return self
 
     @property

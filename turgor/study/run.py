@@ -16,9 +16,11 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.common.units import from_internal
 from turgor.fem.system import System
+from turgor.geometry.imported.mesh_file import MeshFile
 from turgor.geometry.imported.surface import BrokenSurfaceError
 from turgor.mesh import Mesh
 from turgor.mesh.generate import generate
+from turgor.mesh.imported import read_actuator
 from turgor.mesh.named_parts import save_fault, save_named_parts
 from turgor.mesh.partition import partition
 from turgor.results.report import report
@@ -139,7 +141,10 @@ def _divided(case: Case) -> Mesh:
     """Return the mesh of a case with its regions."""
     how = case.mesh
     try:
-        mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells)
+        if isinstance(case.geometry, MeshFile):
+            mesh = read_actuator(case.geometry)
+        else:
+            mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells)
     except InputError as error:
         field = (error.key or "").split(".")[0]
         if field in MeshCase.model_fields:

@@ -1,0 +1,58 @@
+"""A case whose shape is a mesh that another program made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+import turgor as tg
+from turgor.mesh.decks import write_deck
+from turgor.mesh.structured import shell_octant
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    """An octant of a hollow ball in a .inp file in centimetres, and its case."""
+    write_deck(shell_octant(0.4, 0.6, 1), tmp_path / "ball.inp")
+    case = {
+        "geometry": {
+            "template": "mesh",
+            "file": "ball.inp",
+            "unit": "1 cm",
+            "surfaces": {"cavity": {"ball": {"centre": ["0 mm"] * 3, "radius": "4.01 mm"}}},
+            "tip": ["0 mm", "0 mm", "6 mm"],
+        },
+        "materials": {"body": {"model": "neo-hookean", "constants": {"C10": "0.05 MPa"}}},
+        "supports": [{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
+        "loads": [{"type": "pressure", "value": "5 kPa"}],
+        "solver": {"steps": 1},
+    }
+    (tmp_path / "ball.yaml").write_text(yaml.safe_dump(case))
+    return tmp_path / "ball.yaml"
+
+
+def test_the_ball_swells(ball: Path, tmp_path: Path) -> None:
+    done = tg.run(tg.load_case(ball), tmp_path / "run")
+    # Small strain of an incompressible ball of radii a and b: u(r) = C/r² with p = 4 μ C (1/a³ − 1/b³).
+    a, b, mu, p = 4.0, 6.0, 0.1, 0.005
+    tip = done.summary["final"]["tip_displacement_mm"][2]
+    assert tip == pytest.approx(p * a**3 * b / (4 * mu * (b**3 - a**3)), rel=0.1)
+    again = tg.load_case(tmp_path / "run" / "case.yaml")
+    assert Path(again.geometry.file).parent.name == "data"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("mesh.size=1 mm", "mesh.size: the mesh comes from a file"),
+        ("geometry.file=none.inp", "geometry.file: there is no such file"),
+        ("geometry.surfaces.lid={half_space: {point: [0 mm, 0 mm, 9 cm], normal: [0, 0, 1]}}", "geometry.surfaces.lid"),
+        ("supports.0.surface=x9", "supports.0.surface: the actuator has no such surface"),
+    ],
+)
+def test_a_wrong_key_is_named(change: str, words: str, ball: Path) -> None:
+    with pytest.raises(tg.InputError) as found:
+        tg.mesh_case(tg.load_case(ball, [change]))
+    assert words in str(found.value)
