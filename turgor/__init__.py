@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from turgor.mesh.files import read as read_mesh
     from turgor.mesh.files import write as write_mesh
     from turgor.mesh.mesh import Mesh
+    from turgor.mesh.picture import save_picture as draw_mesh
     from turgor.mesh.quality import quality as mesh_quality
+    from turgor.mesh.walls import walls as mesh_walls
     from turgor.study.api import Model
     from turgor.study.case import Case, load_case
     from turgor.study.environment import environment
@@ -68,6 +70,7 @@ __all__ = [
     "StlFile",
     "TurgorError",
     "assess",
+    "draw_mesh",
     "environment",
     "export_case",
     "find_material",
@@ -78,6 +81,7 @@ __all__ = [
     "material",
     "mesh_case",
     "mesh_quality",
+    "mesh_walls",
     "models",
     "preview",
     "read_mesh",
@@ -99,7 +103,9 @@ _HOMES = {
     "turgor.materials.registry": ("material", "models"),
     "turgor.mesh.files": ("read_mesh", "write_mesh"),
     "turgor.mesh.mesh": ("Mesh",),
+    "turgor.mesh.picture": ("draw_mesh",),
     "turgor.mesh.quality": ("mesh_quality",),
+    "turgor.mesh.walls": ("mesh_walls",),
     "turgor.study.api": ("Model",),
     "turgor.study.case": ("Case", "load_case"),
     "turgor.study.environment": ("environment",),
@@ -124,9 +130,11 @@ _HOMES = {
 """Module → the public names that it defines."""
 
 _RENAMED = {
+    "draw_mesh": "save_picture",
     "find_material": "find",
     "material": "create",
     "mesh_quality": "quality",
+    "mesh_walls": "walls",
     "read_mesh": "read",
     "write_mesh": "write",
 }

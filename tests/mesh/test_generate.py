@@ -1,4 +1,5 @@
 import math
+import subprocess
 import sys
 
 import gmsh
@@ -12,6 +13,7 @@ from turgor.mesh.faces import boundary_faces, rim_edges
 from turgor.mesh.generate import LEAST_DISTORTION, generate, nodes_on_polyline, untangled
 from turgor.mesh.structured import box, shell_octant
 from turgor.mesh.tet10 import jacobian_coefficients
+from turgor.mesh.walls import walls
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +130,35 @@ def test_the_same_input_gives_the_same_bits(tube):
         assert getattr(again, name).tobytes() == getattr(tube, name).tobytes()
     for name, triangles in tube.surfaces.items():
         assert again.surface(name).tobytes() == triangles.tobytes()
+
+
+def test_another_process_gives_the_same_bits_too():
+    code = (
+        "import hashlib, sys; from turgor.geometry.reinforced_tube import ReinforcedTube as Tube; "
+        "from turgor.mesh.generate import generate; m = generate(Tube(rings=3, length='30 mm', cavity_length='20 mm'), "
+        "4.0, layers=1); print(hashlib.sha256(m.points.tobytes() + m.cells.tobytes()).hexdigest())"
+    )
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(2)]
+    assert len(runs[0].stdout) == 65
+    assert runs[0].stdout == runs[1].stdout
+
+
+def test_layers_follow_the_walls():
+    template = CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm")
+    plain, one, two = (walls(generate(template, 6.0, layers=layers)) for layers in (None, 1, 2))
+    assert np.median(plain.thickness) == pytest.approx(2.0, rel=0.1)
+    thin = [w.elements[w.thickness < 2.2] for w in (plain, one, two)]
+    assert np.median(thin[0]) < 0.8
+    assert np.median(thin[1]) > 1.0
+    assert np.median(thin[2]) > 2.0
+    # The caps are thick and stay coarse.
+    assert generate(template, 6.0, layers=1).n_cells < 0.5 * generate(template, 1.6).n_cells
+
+
+@pytest.mark.parametrize("layers", [0, 200])
+def test_layers_that_cannot_be_are_refused(layers):
+    with pytest.raises(InputError, match="layers"):
+        generate(CappedTube(), 3.0, layers=layers)
 
 
 def test_finer_elements_bring_the_volume_closer():

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.quality import quality
-from turgor.mesh.structured import box, shell_octant
+from turgor.mesh.structured import box, quadrilateral, rectangle, shell_octant
 from turgor.mesh.tet10 import EDGES
 
 
@@ -53,9 +52,18 @@ def test_distortion_sees_a_bent_edge_and_says_where():
     assert summary["worst_place_mm"] == measured.centres[measured.worst_cell].round(3).tolist()
 
 
-def test_only_tetrahedra_are_measured():
-    with pytest.raises(InputError, match=r"not measured \(found 'hex27'\)"):
-        quality(box((1.0, 1.0, 1.0), (1, 1, 1), "hex27"))
+def test_cubes_squares_and_equilateral_triangles_are_perfect():
+    triangle = quadrilateral([[0, 0], [0.5, -(0.75**0.5)], [1, 0], [0.5, 0.75**0.5]], (1, 1), "tri6")
+    shapes = [box((1.0, 1.0, 1.0), (2, 2, 2), "hex27"), rectangle((1.0, 1.0), (2, 2)), triangle]
+    for shape in shapes:
+        measured = quality(shape)
+        for values in (measured.scaled_jacobian, measured.distortion):
+            np.testing.assert_allclose(values, 1.0, err_msg=shape.cell_type)
+    np.testing.assert_allclose(quality(rectangle((3.0, 1.0), (1, 1))).aspect, 3.0)
+    # A right-angled isosceles triangle: hypotenuse √2, perimeter 2 + √2, area ½.
+    np.testing.assert_allclose(
+        quality(rectangle((1.0, 1.0), (1, 1), "tri6")).aspect, np.sqrt(2) * (2 + np.sqrt(2)) / (2 * np.sqrt(3))
+    )
 
 
 def test_curved_elements_of_a_shell_are_good():

@@ -213,6 +213,9 @@ def mesh(
         Path | None,
         typer.Option(metavar="FILE.png", help="Show the named parts, or where an STL surface is broken."),
     ] = None,
+    quality_picture: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the quality of the elements and the worst one.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Mesh the actuator of a case, write the mesh and say how good it is."""
@@ -221,8 +224,9 @@ def mesh(
         meshed = tg.mesh_case(case, picture)
     path = out or Path(f"{case.name}.vtu")
     tg.write_mesh(meshed, path)
-    judged = tg.mesh_quality(meshed).summary() if meshed.cell_type == "tet10" else {"judged": "tetrahedra only"}
-    facts = tables.mesh_document(meshed, judged, path)
+    if quality_picture:
+        tg.draw_mesh(meshed, quality_picture, show="quality")
+    facts = tables.mesh_document(meshed, path)
     if as_json:
         print_json(facts)
     else:

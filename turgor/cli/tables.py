@@ -84,8 +84,9 @@ def template_document(template: type[Actuator]) -> dict[str, Any]:
     }
 
 
-def mesh_document(mesh: tg.Mesh, quality: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Return what a mesh is made of, in plain values."""
+def mesh_document(mesh: tg.Mesh, path: Path) -> dict[str, Any]:
+    """Return what a mesh is made of and how good it is, in plain values."""
+    walls = tg.mesh_walls(mesh)
     return {
         "file": str(path),
         "elements": mesh.n_cells,
@@ -94,7 +95,8 @@ def mesh_document(mesh: tg.Mesh, quality: Mapping[str, Any], path: Path) -> dict
         "regions": {name: len(cells) for name, cells in mesh.regions.items()},
         "surfaces": {name: len(triangles) for name, triangles in mesh.surfaces.items()},
         "markers": {name: len(nodes) for name, nodes in mesh.markers.items()},
-        "quality": dict(quality),
+        "quality": tg.mesh_quality(mesh).summary(),
+        **({"walls": walls.summary()} if walls else {}),
     }
 
 

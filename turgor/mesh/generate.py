@@ -19,6 +19,7 @@ from turgor.mesh.faces import outward_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.polyline import nodes_on_polyline
 from turgor.mesh.tet10 import FloatArray, IntArray, jacobian_coefficients
+from turgor.mesh.thickness import wall_thickness
 
 LOG = logger("mesh")
 
@@ -34,13 +35,16 @@ PER_CIRCLE_OF_SECTION = 16
 KINDS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra")}
 """Number of coordinates → the cells that gmsh cuts any shape into, and those of shapes made of blocks."""
 
+_EDGE_OF_LAYER = 0.8
+"""Edge length asked for over the thickness of a layer: between the two sides of a wall gmsh leaves longer ones."""
+
 LEAST_DISTORTION = 0.1
 """Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
 _HALVINGS = 4
 
 # gmsh's numbers for these elements, and its tetrahedron's nodes in our order.
-_TET10, _TRI6, _LINE3 = 11, 9, 8
-_NODES = {_TET10: 10, _TRI6: 6, _LINE3: 3}
+_TET10, _TRI6, _TRI3, _LINE3 = 11, 9, 2, 8
+_NODES = {_TET10: 10, _TRI6: 6, _TRI3: 3, _LINE3: 3}
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
@@ -51,6 +55,7 @@ def generate(
     sizes: Mapping[str, float] | None = None,
     per_circle: int | None = None,
     cells: str | None = None,
+    layers: int | None = None,
     progress: Progress = LOG.info,
 ) -> Mesh:
     """Mesh an actuator with curved ten-node tetrahedra, or a section with six-node triangles, all of them valid.
@@ -73,6 +78,9 @@ def generate(
     cells
         ``tetrahedra`` or ``hexahedra``, of a section ``triangles`` or ``quadrilaterals``; left out, the first of
         the two. The second come in rows, for shapes that are made of blocks; their Jacobian is positive at every node.
+    layers
+        Elements through each wall, about: edges follow this part of the wall's thickness, measured on the skin
+        (:mod:`turgor.mesh.thickness`); :mod:`turgor.mesh.walls` counts what came of it. Left out, walls do not count.
     progress
         Called with the name of each stage; the default logs it.
 
@@ -100,6 +108,9 @@ def generate(
         problem = "a plane shape has no such cells" if actuator.section else "a shape in space has no such cells"
         raise InputError(problem, key="cells", value=cells, expected=" or ".join(kinds))
     if cells == kinds[1]:
+        if layers is not None:
+            problem = "layers are for tetrahedra; rows follow the size"
+            raise InputError(problem, key="layers", value=layers, expected="size or sizes")
         progress(f"meshing in rows with elements of {chosen:g} mm")
         return _structured(actuator, chosen, sizes, per_circle)
     with cad.session(actuator.template) as gmsh:
@@ -107,11 +118,14 @@ def generate(
         shape = actuator.draw()
         scale = min(1.0, chosen / default)
         local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
-        _set_local_sizes(gmsh, shape, local)
+        limits = _local_sizes(gmsh, shape, local)
         _check_count(gmsh, shape, chosen)
         progress(f"meshing with elements of {chosen:g} mm")
         circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
         circle = circle if per_circle is None else per_circle
+        if layers is not None:
+            limits.append(_size_of_walls(gmsh, shape, chosen, circle, layers))
+        _set_smallest(gmsh, limits)
         _divide(gmsh, chosen, circle, shape.dimension)
         progress("curving")
         return _named_mesh(gmsh, shape, _curved(gmsh, shape))
@@ -140,8 +154,8 @@ class _Cells:
     index: IntArray
 
 
-def _set_local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float]) -> None:
-    """Limit the size inside named regions and on named surfaces; from their edges it grows outward by itself."""
+def _local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float]) -> list[int]:
+    """Return fields that limit the size inside named regions and on named surfaces; from there it grows by itself."""
     field = gmsh.model.mesh.field
     limits = []
     for name, size in sizes.items():
@@ -154,10 +168,61 @@ def _set_local_sizes(gmsh: ModuleType, shape: Shape, sizes: Mapping[str, float])
         field.setNumbers(limit, regions, shape.regions.get(name, []))
         field.setNumbers(limit, surfaces, shape.surfaces.get(name, []))
         limits.append(limit)
+    return limits
+
+
+def _set_smallest(gmsh: ModuleType, limits: list[int]) -> None:
+    """Let the smallest of the fields limit the size."""
     if limits:
+        field = gmsh.model.mesh.field
         smallest = field.add("Min")
         field.setNumbers(smallest, "FieldsList", limits)
         field.setAsBackgroundMesh(smallest)
+
+
+def _size_of_walls(gmsh: ModuleType, shape: Shape, size: float, per_circle: int, layers: int) -> int:
+    """Return a field that puts `layers` elements through each wall, from a first mesh of the skin."""
+    if shape.dimension != 3:
+        raise InputError("walls are measured in space only", key="layers", value=layers, expected="sizes instead")
+    if not (isinstance(layers, int) and layers >= 1):
+        raise InputError("the number of layers must be at least 1", key="layers", value=layers)
+    _divide(gmsh, size, per_circle, 2)
+    points, triangles = _skin(gmsh, shape)
+    wall = np.minimum(_EDGE_OF_LAYER * wall_thickness(points, triangles) / layers, size)
+    _check_walls(points[triangles], wall, layers)
+    view = gmsh.view.add("walls")
+    # A facet that reaches over to a thinner wall takes its size.
+    at_node = np.full(len(points), np.inf)
+    np.minimum.at(at_node, triangles, wall[:, None])
+    corners = points[triangles].transpose(0, 2, 1).reshape(len(triangles), 9)
+    gmsh.view.addListData(view, "ST", len(triangles), np.hstack([corners, at_node[triangles]]).ravel())
+    gmsh.model.mesh.clear()
+    field = gmsh.model.mesh.field.add("PostView")
+    gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
+    return int(field)
+
+
+def _skin(gmsh: ModuleType, shape: Shape) -> tuple[FloatArray, IntArray]:
+    """Return points and outward triangles of the skin's mesh."""
+    pairs = [(3, tag) for tags in shape.regions.values() for tag in tags]
+    skin = gmsh.model.getBoundary(pairs, combined=True, oriented=True)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max()) + 1, dtype=np.int32)
+    place[tags] = np.arange(len(tags))
+    blocks = []
+    for _, tag in skin:
+        nodes = gmsh.model.mesh.getElementsByType(_TRI3, abs(tag))[1].reshape(-1, 3)
+        blocks.append(place[nodes] if tag > 0 else place[nodes][:, ::-1])
+    return coordinates.reshape(-1, 3), np.vstack(blocks)
+
+
+def _check_walls(corners: FloatArray, size: FloatArray, layers: int) -> None:
+    """Refuse layers that would fill the memory: half of each wall belongs to the facets of either side."""
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    count = 8.5 * float((area * 0.5 * layers * size / size**3).sum())
+    if count > MOST_CELLS:
+        problem = f"so many layers need about {count:.1g} elements"
+        raise InputError(problem, key="layers", value=layers, expected=f"fewer: at most {MOST_CELLS:.0g} elements")
 
 
 def _check_count(gmsh: ModuleType, shape: Shape, size: float) -> None:

@@ -102,6 +102,7 @@ class MeshCase(StrictModel):
     cells: Literal["tetrahedra", "hexahedra", "triangles", "quadrilaterals"] | None = Field(
         default=None, description="left out, tetrahedra or triangles; the others where the shape is made of blocks"
     )
+    layers: int | None = Field(default=None, strict=True, ge=1, le=20, description="elements through a wall, at least")
 
 
 class RegionCase(StrictModel):

@@ -27,6 +27,7 @@ class _Meshed(Actuator):
         sizes: Mapping[str, str] | None = None,
         per_circle: int | None = None,
         cells: str | None = None,
+        layers: int | None = None,
     ) -> Mesh:
         """Mesh the actuator.
 
@@ -41,6 +42,8 @@ class _Meshed(Actuator):
         cells
             ``hexahedra`` or, of a section, ``quadrilaterals``, where the shape is made of blocks; left out, tetrahedra
             or triangles.
+        layers
+            Elements through a wall, at least; left out, walls do not count.
 
         Raises
         ------
@@ -49,7 +52,7 @@ class _Meshed(Actuator):
         """
         local = {name: to_internal(text, "length", key=f"sizes.{name}") for name, text in (sizes or {}).items()}
         whole = None if size is None else to_internal(size, "length", key="size")
-        return generate(self, whole, sizes=local, per_circle=per_circle, cells=cells)
+        return generate(self, whole, sizes=local, per_circle=per_circle, cells=cells, layers=layers)
 
 
 def preview(name: str, path: str | Path, changes: Sequence[str] = ()) -> None:
