@@ -259,3 +259,13 @@ def test_sections_and_rows_are_meshed_too(model: str, cells: str, tmp_path: Path
     facts = printed("mesh", example, *changes, "--out", tmp_path / "tube.vtu", "--json")
     assert facts["elements"] > 50
     assert (tmp_path / "tube.vtu").stat().st_size > 1000
+
+
+def test_mesh_counts_elements_through_the_walls_and_draws_them(tmp_path: Path) -> None:
+    picture = tmp_path / "tube.png"
+    arguments = ("--out", tmp_path / "tube.vtu", "--quality-picture", picture, "--set", "mesh.layers=2", "--json")
+    facts = printed("mesh", SMALL, *arguments)
+    assert facts["walls"]["thinnest_mm"] == pytest.approx(3.0, rel=0.1)
+    assert facts["walls"]["elements_through_median"] > 2.0
+    assert facts["quality"]["scaled_jacobian_min"] > 0.0
+    assert picture.read_bytes().startswith(b"\x89PNG")

@@ -16,6 +16,7 @@ import yaml
 from plotly.offline import get_plotlyjs
 
 from turgor.common.errors import MissingPackageError
+from turgor.mesh.quality import quality
 from turgor.results import animation, curve_plots, plots
 from turgor.results.archive import Row
 from turgor.results.camera import camera_for
@@ -231,10 +232,13 @@ _CELLS = {
 def _mesh_facts(body: Body) -> dict[str, Any]:
     mesh, section = body.mesh, body.section
     model = {} if section is None else {"Model": _MODELS[section.kind].format(thickness=section.thickness or 1.0)}
+    measured = quality(mesh)
+    jacobian, worst = measured.scaled_jacobian, measured.centres[measured.worst_cell].round(1).tolist()
     return {
         **model,
         "Elements": f"{mesh.n_cells} {_CELLS[mesh.cell_type]}",
         "Nodes": mesh.n_points,
+        "Scaled Jacobian": f"at least {jacobian.min():.2f} (near {worst} mm), mean {jacobian.mean():.2f}",
         **({"Volume / mm³": mesh.volume()} if section is None else {"Area / mm²": mesh.volume()}),
         "Regions": ", ".join(mesh.regions),
         "Surfaces": ", ".join(mesh.surfaces) or "–",

@@ -144,7 +144,9 @@ def _divided(case: Case) -> Mesh:
         if isinstance(case.geometry, MeshFile):
             mesh = read_actuator(case.geometry)
         else:
-            mesh = generate(case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells, layers=how.layers)
+            mesh = generate(
+                case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells, layers=how.layers
+            )
     except InputError as error:
         field = (error.key or "").split(".")[0]
         if field in MeshCase.model_fields:
