@@ -1,16 +1,13 @@
-"""Bodies that touch: meshes in several parts, hollow boxes, graded blocks, and an independent look for overlaps."""
+"""Bodies that touch: meshes in several parts, hollow boxes, graded blocks."""
 
 from __future__ import annotations
 
-import ipctk
 import numpy as np
 from scipy.optimize import brentq
 
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box
-
-QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 
 def merged(**parts: Mesh) -> Mesh:
@@ -55,19 +52,3 @@ def half_chamber(lengths: tuple[float, float, float], divisions: tuple[int, int,
     sides = {name: (points[faces][:, :, axis] == at).all(axis=1) for name, (axis, at) in ends.items()}
     surfaces = {name: faces[here] for name, here in sides.items()}
     return Mesh(points, cells, surfaces=surfaces | {"cavity": faces[~np.any(list(sides.values()), axis=0)]})
-
-
-def overlaps_by_more_than(mesh: Mesh, u: np.ndarray, depth: float) -> bool:
-    """Whether the skin, with every node drawn `depth` into the body, still intersects itself (IPC Toolkit)."""
-    faces = boundary_faces(mesh.cells)
-    x = mesh.points + u
-    triangles = faces[:, QUARTERS].reshape(-1, 3)
-    normal = np.zeros_like(x)
-    across = np.cross(x[triangles[:, 1]] - x[triangles[:, 0]], x[triangles[:, 2]] - x[triangles[:, 0]])
-    for k in range(3):
-        np.add.at(normal, triangles[:, k], across)
-    used, local = np.unique(triangles, return_inverse=True)
-    local = local.reshape(-1, 3)
-    drawn = x[used] - depth * normal[used] / np.linalg.norm(normal[used], axis=1, keepdims=True)
-    skin = ipctk.CollisionMesh(drawn, ipctk.edges(local), local)
-    return bool(ipctk.has_intersections(skin, drawn))

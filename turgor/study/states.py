@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from turgor.fem.contact.friction import WIDTH
-from turgor.fem.contact.term import Touch
+from turgor.fem.contact.intersection import IntersectionCheck
+from turgor.fem.contact.surfaces import SurfaceContact
+from turgor.fem.contact.term import Contact
 from turgor.fem.fields import von_mises
 from turgor.fem.interface import Interface, interfaces
 from turgor.fem.state import State
@@ -99,10 +101,11 @@ def standing(system: System, state: State, between: Sequence[Interface]) -> dict
     -------
     dict
         ``contact``: by its name, area, overlap (also in parts of the wall behind it) and what a rigid body feels;
+        of the body with itself, where the IPC Toolkit is installed, whether more than 1 % of the wall overlaps;
         ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction.
     """
     found = {
-        "contact": {touch.name: _touch(touch) for touch in system.touches(state)},
+        "contact": {contact.name: _touch(contact, state) for contact in system.contacts},
         "fibres": {
             embedded.fibre.curve: {
                 "largest_tension_N": float(embedded.tension(state.u).max()),
@@ -115,12 +118,15 @@ def standing(system: System, state: State, between: Sequence[Interface]) -> dict
     return {kind: facts for kind, facts in found.items() if facts}
 
 
-def _touch(touch: Touch) -> dict[str, Any]:
+def _touch(contact: Contact, state: State) -> dict[str, Any]:
+    touch = contact.touch(state)
     facts: dict[str, Any] = {
         "area_mm2": touch.area,
         "overlap_mm": touch.overlap,
         "overlap_per_wall": touch.overlap_per_wall,
     }
+    if isinstance(contact, SurfaceContact) and IntersectionCheck.is_possible():
+        facts["surfaces_intersect"] = contact.intersection_check.intersects(state.u)
     if touch.force is not None and touch.torque is not None:
         facts |= {"force_N": list(touch.force), "torque_N_mm": list(touch.torque)}
     return facts

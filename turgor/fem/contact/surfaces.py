@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
+from turgor.fem.contact.intersection import IntersectionCheck
 from turgor.fem.contact.pairs import NOWHERE, balls, find_partners, gap_gradients, pair_stiffness
 from turgor.fem.contact.search import Search
 from turgor.fem.contact.skin import STIFFNESS, Skin
@@ -80,6 +82,11 @@ class SurfaceContact:
         self._number = number
         self._search = Search(skin, group)
         self._found: list[tuple[Floats, Pairs]] = []
+
+    @cached_property
+    def intersection_check(self) -> IntersectionCheck:
+        """An independent look at what the faces do."""
+        return IntersectionCheck(self.skin)
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
