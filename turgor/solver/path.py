@@ -332,6 +332,8 @@ class _Walk:
                 return found
             self._tally.count(found)
             found = find_equilibrium(system, self.linear, state, aim, newton, report)
+            if found.iterations == 0:
+                return found
         if system.rubs:
             raise NotConvergedError("the forces of friction do not settle")
         return found
