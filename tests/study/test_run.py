@@ -149,6 +149,7 @@ def test_a_run_that_stops_short_keeps_what_it_reached(small_tube: Path, tmp_path
     assert "kPa in cavity" in stopped.reason
     summary = json.loads((stopped.folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["solver"]["steps"] == RunStore.open(stopped.folder).n_steps > 0
+    assert summary["outcome"] == "limit-pressure" == summary["events"][-1]["event"]
     assert 0 < summary["facts"]["last_fraction"] < 1
     assert summary["facts"]["pressure:cavity_kPa"] == pytest.approx(summary["final"]["pressure_kPa"])
     assert (stopped.folder / "report.html").exists()

@@ -58,6 +58,8 @@ def save_record(path: Path, record: StepRecord, row: Row, curves: Curves) -> Non
     plain = {name: getattr(record, name) for name in PLAIN_FIELDS}
     plain |= {name: dict(value) for name, value in plain.items() if isinstance(value, Mapping)}
     arrays = {name: np.asarray(getattr(record, name), dtype=np.float64) for name in ARRAY_FIELDS}
+    if record.mode is not None:
+        arrays["mode"] = np.asarray(record.mode, dtype=np.float64)
     _save(path, {**arrays, "plain": _as_json(plain), "row": _as_json(row), "curves": _as_json(curves)})
 
 
@@ -66,6 +68,7 @@ def load_record(path: Path) -> StepRecord:
 
     def build(archive: Mapping[str, npt.NDArray[Any]]) -> StepRecord:
         arrays: dict[str, Any] = {name: archive[name] for name in ARRAY_FIELDS}
+        arrays["mode"] = archive.get("mode")
         return StepRecord(**_from_json(archive["plain"]), **arrays)
 
     return _load(path, build)
@@ -95,6 +98,7 @@ def save_vtu(path: Path, mesh: Mesh, record: StepRecord) -> None:
         point_data={
             "displacement_mm": np.asarray(in_space(record.displacement), dtype=np.float32),
             "von_mises_MPa": np.asarray(record.von_mises, dtype=np.float32),
+            **({} if record.mode is None else {"mode": np.asarray(in_space(record.mode), dtype=np.float32)}),
         },
         cell_data={
             "mean_pressure_MPa": [np.asarray(record.element_pressure, dtype=np.float32)],

@@ -43,6 +43,7 @@ def row(state: StoredState, measures: Iterable[Choice]) -> Row:
     return {
         "step": record.index,
         "fraction": float(record.fraction),
+        **({"time_s": record.solver["time_s"]} if "time_s" in record.solver else {}),
         **_loads(record.loads),
         "max_displacement_mm": max_displacement(record.displacement),
         "max_von_mises_MPa": float(record.von_mises_max),
@@ -52,6 +53,7 @@ def row(state: StoredState, measures: Iterable[Choice]) -> Row:
         **_contacts(record.standing.get("contact", {})),
         **_fibres(record.standing.get("fibres", {})),
         **{fact: record.solver[fact] for fact in SOLVER_FACTS},
+        "event": str(record.solver.get("event", "")),
     }
 
 
@@ -117,4 +119,4 @@ def _text(value: object) -> str:
         return ""
     if isinstance(value, bool):
         return str(value).lower()
-    return repr(value)
+    return value if isinstance(value, str) else repr(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +43,10 @@ MOTION = (
 )
 """What the load–motion curves show, most telling first."""
 
-_LOAD = (Quantity("pressure_kPa", "Pressure / kPa"), Quantity("fraction", "Load parameter"))
+_TIME = Quantity("time_s", "Time / s")
+_PRESSURE = Quantity("pressure_kPa", "Pressure / kPa")
+_VOLUME = Quantity("cavity_volume_mm3", "Cavity volume / mm³")
+_LOAD = (_TIME, _PRESSURE, Quantity("fraction", "Load parameter"))
 _COMPONENTS = tuple((axis, f"tip_displacement_{axis}_mm") for axis in "xyz")
 _ANGLES = ("bending_angle_deg", "twist_deg")
 _NEGLIGIBLE_ANGLE_DEG, _NEGLIGIBLE_SHARE = 0.1, 1e-3
@@ -52,12 +56,14 @@ _SCENE_FILL = 0.8
 
 
 def load_axis(history: Sequence[Row]) -> Quantity:
-    """Return the quantity that the load is told by: the pressure where there is one, else the load parameter."""
+    """Return what the load is told by: the time of a programme, else the pressure or the load parameter."""
     return next(quantity for quantity in _LOAD if all(quantity.key in entry for entry in history))
 
 
 def load_motion(history: Sequence[Row]) -> go.Figure:
     """Return the load–motion curves: each quantity of :data:`MOTION` that the run has, over the load.
+
+    Where the pressure follows a programme it is shown over time, and where it falls on the way, over the volume.
 
     Parameters
     ----------
@@ -68,21 +74,33 @@ def load_motion(history: Sequence[Row]) -> go.Figure:
     load = load_axis(history)
     shown = [quantity for quantity in MOTION if _is_worth_showing(quantity.key, history)]
     columns = 2
-    rows = -(-len(shown) // columns)
+    curves = [*_pressure_curve(load, history), *((load, quantity) for quantity in shown)]
+    rows = -(-len(curves) // columns)
     figure = make_subplots(rows=rows, cols=columns, horizontal_spacing=0.11, vertical_spacing=0.22 / max(rows, 1))
-    loads = [entry[load.key] for entry in history]
-    for place, quantity in enumerate(shown):
+    for place, (axis, quantity) in enumerate(curves):
         row, column = divmod(place, columns)
-        for trace in _traces(quantity, loads, history):
+        for trace in _traces(quantity, [entry[axis.key] for entry in history], history):
             figure.add_trace(trace, row=row + 1, col=column + 1)
-        figure.update_xaxes(title_text=load.title, row=row + 1, col=column + 1)
+        figure.update_xaxes(title_text=axis.title, row=row + 1, col=column + 1)
         figure.update_yaxes(title_text=quantity.title, row=row + 1, col=column + 1)
     finish(figure, height=320 * rows)
     if _TIP in shown:
-        row, column = divmod(shown.index(_TIP), columns)
+        row, column = divmod(curves.index((load, _TIP)), columns)
         corner = figure.get_subplot(row + 1, column + 1)
         figure.update_layout(legend={"x": corner.xaxis.domain[0], "y": corner.yaxis.domain[1]})
     return figure
+
+
+def _pressure_curve(load: Quantity, history: Sequence[Row]) -> list[tuple[Quantity, Quantity]]:
+    """Return the axes of a curve of the pressure itself, where that tells something: at most one."""
+    if not all(_PRESSURE.key in entry for entry in history):
+        return []
+    if load == _TIME:
+        return [(_TIME, _PRESSURE)]
+    sizes = [abs(float(entry[_PRESSURE.key])) for entry in history]
+    falls = any(later < (1.0 - _NEGLIGIBLE_SHARE) * earlier for earlier, later in itertools.pairwise(sizes))
+    falls = falls or any(entry.get("event") for entry in history)
+    return [(_VOLUME, _PRESSURE)] if falls and all(_VOLUME.key in entry for entry in history) else []
 
 
 def _is_worth_showing(key: str, history: Sequence[Row]) -> bool:
@@ -110,6 +128,13 @@ def _largest(key: str, history: Sequence[Row]) -> float:
 
 def _traces(quantity: Quantity, loads: Sequence[float], history: Sequence[Row]) -> list[go.Scatter]:
     symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]
+    cavities = [key for key in history[0] if key.startswith("pressure_") and key != _PRESSURE.key]
+    if quantity == _PRESSURE and cavities:
+        names = {key: key.removeprefix("pressure_").removesuffix("_kPa") for key in cavities}
+        return [
+            line_trace(loads, [entry[key] for entry in history], symbols, color, name=names[key], legend=False)
+            for key, color in zip(cavities, itertools.cycle(SERIES), strict=False)
+        ]
     if quantity != _TIP:
         values = [entry[quantity.key] for entry in history]
         return [line_trace(loads, values, symbols, ACCENT, name=quantity.title, legend=False)]

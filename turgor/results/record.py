@@ -43,10 +43,13 @@ class StepRecord:
     cavity_volumes
         Enclosed volume of each cavity, mm³.
     solver
-        The :data:`SOLVER_FACTS` of the step; ``stable`` is ``None`` where the solver cannot tell.
+        The :data:`SOLVER_FACTS` of the step; ``stable`` is ``None`` where the solver cannot tell. ``event`` names
+        what makes the state special (``"limit-pressure"``), ``time_s`` is its time where loads follow programmes.
     standing
         How contacts (``contact``), fibres (``fibres``) and the interfaces of two materials (``interfaces``) stand, by
         their names, in plain values with keys that end in their unit; only what the body has.
+    mode
+        Eigenmode in which the body gives way in this state, ``(n, 3)``, largest component one, where it does.
     """
 
     index: int
@@ -61,6 +64,7 @@ class StepRecord:
     cavity_volumes: Mapping[str, float]
     solver: Mapping[str, Any]
     standing: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
+    mode: FloatArray | None = None
 
     def check(self, mesh: Mesh) -> None:
         """Raise InputError unless the arrays have the shapes that `mesh` asks for."""
@@ -81,5 +85,5 @@ class StepRecord:
 
 
 ARRAY_FIELDS = ("displacement", "element_pressure", "element_dilatation", "von_mises")
-PLAIN_FIELDS = tuple(entry.name for entry in fields(StepRecord) if entry.name not in ARRAY_FIELDS)
+PLAIN_FIELDS = tuple(entry.name for entry in fields(StepRecord) if entry.name not in (*ARRAY_FIELDS, "mode"))
 """The fields of a record that JSON can hold; the others are arrays."""

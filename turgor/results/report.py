@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,10 @@ from turgor.results.stored import Body
 FILE_NAME = "report.html"
 
 _N_PICTURES = 5
+_N_MODES = 2
+_MODE_SIZE = 0.1
+"""Largest displacement of a mode in its picture, in parts of the size of the body."""
+
 _SCENE_ASPECT = 1.6
 _SIGNIFICANT = 4
 
@@ -171,7 +175,10 @@ def _frame_label(history: Sequence[Row], index: int, load: plots.Quantity) -> st
 
 def _load_label(entry: Row, load: plots.Quantity) -> str:
     value = f"{entry[load.key]:.4g}"
-    return f"{value} kPa" if load.key == "pressure_kPa" else f"load parameter {value}"
+    event = f" · {entry['event'].replace('-', ' ')}" if entry.get("event") else ""
+    if load.key == "time_s" and "pressure_kPa" in entry:
+        return f"{value} s, {entry['pressure_kPa']:.4g} kPa{event}"
+    return (f"{value} kPa" if load.key == "pressure_kPa" else f"load parameter {value}") + event
 
 
 def _cards(history: Sequence[Row]) -> list[Card]:
@@ -201,6 +208,12 @@ def _pictures(
     indices = sorted({max(0, round((k + 1) * count / _N_PICTURES) - 1) for k in range(_N_PICTURES)})
     records: list[StepRecord] = [store.load(index) for index in indices]
     labels = [_load_label(history[index], load) for index in indices]
+    for index in [entry["step"] for entry in history if entry.get("event")][:_N_MODES]:
+        record = store.load(index)
+        if record.mode is not None:
+            # First in the list: the last one is also drawn cut open.
+            records.insert(0, _along_mode(store.body, record))
+            labels.insert(0, f"the mode at {_load_label(history[index], load)}, enlarged")
     try:
         drawn = draw(store.body, records, labels, scale_max)
     except MissingPackageError as error:
@@ -210,6 +223,13 @@ def _pictures(
         captions.append(f"{labels[-1]}, cut open")
         files.append(drawn.section)
     return [Picture(text, _data_address(file)) for text, file in zip(captions, files, strict=True)], None
+
+
+def _along_mode(body: Body, record: StepRecord) -> StepRecord:
+    """Return a state moved on along the mode in which it gives way, far enough to be seen."""
+    assert record.mode is not None
+    size = float(np.ptp(body.mesh.points, axis=0).max())
+    return replace(record, displacement=record.displacement + _MODE_SIZE * size * record.mode)
 
 
 def _data_address(png: bytes) -> str:

@@ -18,6 +18,7 @@ Summary = dict[str, Any]
 KEYS: dict[str, tuple[str, ...]] = {
     "converged": (),
     "reason": (),
+    "outcome": (),
     "final": (),
     "mesh": ("elements", "nodes", "dofs"),
     "solver": ("steps", "iterations", "factorisations", "wall_s", "peak_memory_MB", "stable"),
@@ -26,7 +27,7 @@ KEYS: dict[str, tuple[str, ...]] = {
 """The keys of a summary and what at least lies under them."""
 
 _PACKAGES = ("turgor", "numpy", "scipy", "numba", "mkl", "gmsh", "meshio")
-_NOT_FINAL = {"step", "fraction", *SOLVER_FACTS}
+_NOT_FINAL = {"step", "fraction", "event", *SOLVER_FACTS}
 _TIP = tuple(f"tip_displacement_{axis}_mm" for axis in "xyz")
 
 
@@ -36,6 +37,7 @@ def summarise(
     *,
     converged: bool,
     reason: str,
+    outcome: str | None = None,
     dofs: int,
     wall_s: float,
     peak_memory_mb: float,
@@ -52,6 +54,8 @@ def summarise(
         Whether the target was reached.
     reason
         Why the run ended, in words.
+    outcome
+        The same as one of a few words (``docs/results.md``); left out, by `converged`.
     dofs
         Free degrees of freedom.
     wall_s
@@ -65,6 +69,7 @@ def summarise(
     return {
         "converged": converged,
         "reason": reason,
+        "outcome": outcome or ("target-reached" if converged else "not-converged"),
         "final": final,
         "mesh": {"elements": mesh.n_cells, "nodes": mesh.n_points, "dofs": dofs},
         "solver": {
@@ -76,7 +81,14 @@ def summarise(
             "stable": history[-1]["stable"] if history else None,
         },
         "versions": versions(),
+        **({"events": events} if (events := [_event(entry) for entry in history if entry.get("event")]) else {}),
     }
+
+
+def _event(entry: Row) -> Row:
+    """Return what a special state is, where it is, and its step, whose file holds its mode."""
+    places = ("pressure_kPa", "cavity_volume_mm3", "stable")
+    return {"event": entry["event"], "step": entry["step"]} | {key: entry[key] for key in places if key in entry}
 
 
 def versions() -> dict[str, str]:

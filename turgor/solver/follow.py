@@ -152,10 +152,8 @@ def follow_arc(
         post.tally.count(found)
         if on_progress is not None:
             on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
-        if previous.rising != found.rising and sign * (walk.measure(found) - walk.measure(previous)) > 0.0:
-            turned = arc.turned
-            if turned:
-                post.send_limit(walk.limit_between(previous, found))
+        if previous.rising != found.rising and arc.is_flat(previous, found):
+            post.send_limit(walk.limit_between(previous, found))
         walk.before, walk.here = previous, found
         post.send(found)
     return post.sent
@@ -171,7 +169,6 @@ class _Arc:
         # From rest the path sets out along the tangent, dQ/df being the compliance.
         way = np.array([here.compliance / scale, 1.0])
         self.direction = sign * np.sign(way[0]) * way / np.linalg.norm(way)
-        self.turned = False
 
     def advance(self) -> Equilibrium | None:
         """Return the next state, or ``None`` where even short steps find none."""
@@ -189,11 +186,15 @@ class _Arc:
                 log.info("arc-length step turned back")
                 length *= 0.5
                 continue
-            before = self.direction
             self.direction = way / np.linalg.norm(way)
-            self.turned = bool(before[1] * self.direction[1] < 0.0)
             return found
         return None
+
+    def is_flat(self, first: Equilibrium, second: Equilibrium) -> bool:
+        """Whether the path runs along the volume between two states: there the load turns, elsewhere the volume."""
+        assert first.compliance is not None
+        assert second.compliance is not None
+        return abs(first.compliance * second.compliance) > self.scale**2
 
     def _at(self, length: float) -> Equilibrium:
         walk = self.walk

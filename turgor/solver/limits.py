@@ -14,7 +14,7 @@ from turgor.solver.volume import LimitPoint, VolumeWalk
 
 log = logger("solver")
 
-SNAP_STEPS = 80
+SNAP_STEPS = 60
 """Steps that the walk along the falling branch may take."""
 
 MOST_VOLUMES = 1000.0
@@ -47,6 +47,7 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
     ended = f"after {SNAP_STEPS} steps"
     for found in itertools.islice(walk, SNAP_STEPS):
         tally.count(found)
+        walk.first_step = max(walk.first_step, walk.step)  # the walk ends where steps must be so much shorter again
         log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
         if found.fraction >= goal:
             try:

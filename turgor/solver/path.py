@@ -161,11 +161,13 @@ class _Walk:
         self.before: Equilibrium | None = None
         self.step = options.largest_step
         self._tally = Tally()
+        self._delivered: Equilibrium | None = None
         self._failures = 0
 
     def deliver(self) -> None:
         """Hand out the equilibrium reached, with the work of all steps since the last one; not a second time."""
-        if not self._tally.is_empty:
+        if not self._tally.is_empty and self.here is not self._delivered:
+            self._delivered = self.here
             self.on_equilibrium(self._tally.closed(self.here))
 
     def settle(self) -> None:

@@ -78,11 +78,15 @@ def at_limit(
     # On the way down the pressures have a minimum, and what snaps back shrinks.
     falls = bool(np.sum(limit.equilibrium.state.loads * system.growth(limit.equilibrium.fraction)) < 0.0)
     beyond = "shrinks while the pressure rises" if falls else "grows while the pressure falls"
+    advice = "Control by volume follows it further; a thicker wall, a stiffer or a stiffening material raises the limit"
+    cause = ""
+    if (point := worst_point(system, limit.equilibrium)).margin < 0.0:
+        _, cause, advice, more = _material(point)
+        facts |= more
     return LimitPressureError(
-        f"the limit is reached at {load_text(facts)}: beyond it the actuator {beyond}{why_not_further}",
-        advice=(
-            "Control by volume follows it further; a thicker wall, a stiffer or a stiffening material raises the limit"
-        ),
+        f"the limit is reached at {load_text(facts)}: beyond it the actuator {beyond}{why_not_further}"
+        + (f"; {cause}" if cause else ""),
+        advice=advice,
         facts=facts | (details or {}),
         limit=limit,
     )

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.fem.loads import Pressure
 from turgor.fem.section import check_section, section_of
+from turgor.fem.system import System
 from turgor.geometry.section import PlaneSection
 from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
 from turgor.results.measures import Choice, available, check
 from turgor.results.stored import Body
 from turgor.solver.newton import Equilibrium
-from turgor.solver.path import PathOptions, output_fractions, solve_path
+from turgor.solver.path import PathOptions, output_fractions
+from turgor.study.boundary import UNKNOWN, PressureCase
 from turgor.study.build import every_region
+from turgor.study.control import VolumeControl, volume_text
+from turgor.study.course import LoadCourse, QuantityCourse, course_by
 from turgor.study.path import Path
 from turgor.study.setup import Setup, cavities_of
 from turgor.study.states import Recorder
@@ -89,6 +94,7 @@ class Model:
         *,
         steps: int = 10,
         cavity: str | None = None,
+        post_snap: bool = False,
         options: PathOptions | None = None,
         on_step: Callable[[Path], None] | None = None,
     ) -> Path:
@@ -102,6 +108,8 @@ class Model:
             Number of states at equal steps of the pressure; the solver takes more or less steps between as it needs.
         cavity
             Which cavity; left out, all of them.
+        post_snap
+            Whether to go on behind a limit pressure, from the state that the actuator snaps to.
         options
             Tolerance and bounds of the solver's steps.
         on_step
@@ -115,13 +123,84 @@ class Model:
             If no equilibrium is found before the target; its facts tell how far it came, and `on_step` has been given
             the states until then.
         """
-        if not (isinstance(steps, int) and steps >= 1):
-            raise InputError("the number of steps must be at least 1", key="steps", value=steps, expected="10")
+        _check_steps(steps)
         value = to_internal(pressure, "pressure", key="pressure")
         cavities = [cavity] if cavity else _cavities(self.mesh)
-        pressures = [Pressure(name, value) for name in cavities]
-        system = self.setup.system(self.mesh, self.materials, pressures, self.body.mechanics)
-        recorder = Recorder(system)
+        system = self._system([Pressure(name, value) for name in cavities])
+        how = replace(options or PathOptions(), post_snap=post_snap)
+        return self._walked(LoadCourse(system, output_fractions(steps), how), on_step)
+
+    def inflate_to(
+        self,
+        volume: str,
+        *,
+        steps: int = 10,
+        cavity: str | None = None,
+        options: PathOptions | None = None,
+        on_step: Callable[[Path], None] | None = None,
+    ) -> Path:
+        """Let the enclosed volume grow and return the equilibria on the way, through limits of the pressure.
+
+        Parameters
+        ----------
+        volume
+            Target with its unit, or in per cent of the volume at rest, such as ``"250 %"``.
+        steps
+            Number of states at equal steps of the volume.
+        cavity
+            Which cavity; left out, all of them together, at the same pressure.
+        options, on_step
+            As for :meth:`inflate`.
+
+        Raises
+        ------
+        InputError, SolverError
+            As :meth:`inflate` does.
+        """
+        _check_steps(steps)
+        cavities = [cavity] if cavity else _cavities(self.mesh)
+        system = self._system([Pressure(name, UNKNOWN) for name in cavities])
+        control = VolumeControl(type="volume", target=volume_text(volume))
+        return self._walked(course_by(control, system, None, steps, options or PathOptions()), on_step)
+
+    def play(
+        self,
+        programmes: Mapping[str, Mapping[str, Sequence[str]]],
+        *,
+        steps: int = 10,
+        options: PathOptions | None = None,
+        on_step: Callable[[Path], None] | None = None,
+    ) -> Path:
+        """Let each pressure follow its programme over time and return the equilibria at equal steps of time.
+
+        Parameters
+        ----------
+        programmes
+            Cavity → its programme as in a case file: ``{"time": ["0 s", "1 s"], "pressure": ["0 kPa", "20 kPa"]}``.
+        steps
+            Number of states at equal steps of time.
+        options, on_step
+            As for :meth:`inflate`.
+
+        Raises
+        ------
+        InputError, SolverError
+            As :meth:`inflate` does.
+        """
+        _check_steps(steps)
+        loads = [{"type": "pressure", "cavity": name, "programme": dict(table)} for name, table in programmes.items()]
+        setup = Setup.read(supports=_default_supports(self.mesh), loads=loads)
+        duration = setup.duration
+        pressures = [load.build(duration) for load in setup.loads if isinstance(load, PressureCase)]
+        course = LoadCourse(self._system(pressures), output_fractions(steps), options or PathOptions(), duration)
+        return self._walked(course, on_step)
+
+    def _system(self, pressures: Sequence[Pressure]) -> System:
+        return self.setup.system(self.mesh, self.materials, pressures, self.body.mechanics)
+
+    def _walked(self, course: LoadCourse | QuantityCourse, on_step: Callable[[Path], None] | None) -> Path:
+        system = course.system
+        recorder = Recorder(system, course=course)
         path = Path(self.body, system.n_dofs, self._description(), self.measures)
 
         def keep(equilibrium: Equilibrium) -> None:
@@ -130,7 +209,7 @@ class Model:
             if on_step is not None:
                 on_step(path)
 
-        solve_path(system, output_fractions(steps), options=options, on_equilibrium=keep)
+        course.walk(None, keep, None)
         return path
 
     def _description(self) -> dict[str, Any]:
@@ -141,6 +220,11 @@ class Model:
             },
             **self.setup.model_dump(mode="json", exclude_none=True),
         }
+
+
+def _check_steps(steps: int) -> None:
+    if not (isinstance(steps, int) and steps >= 1):
+        raise InputError("the number of steps must be at least 1", key="steps", value=steps, expected="10")
 
 
 def _default_supports(mesh: Mesh) -> list[dict[str, str]]:

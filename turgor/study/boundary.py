@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from turgor.common.units import Acceleration, Force, Foundation, Length, Pressure
 from turgor.fem.loads import Force as SurfaceForce
 from turgor.fem.loads import Gravity, Traction
 from turgor.fem.loads import Pressure as CavityPressure
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
+from turgor.study.programme import ProgrammeCase, written_out
 from turgor.study.validation import StrictModel, invalid
+
+UNKNOWN = 0.01
+"""What counts as the full pressure, MPa, where the pressure is what it must be: only a scale."""
 
 Vector = tuple[float, float, float]
 
@@ -83,15 +87,43 @@ class ElasticCase(StrictModel):
 
 
 class PressureCase(StrictModel):
-    """Air pressure above the atmosphere's in a closed cavity."""
+    """Air pressure above the atmosphere's in a closed cavity: a full value, or a programme over time."""
 
     type: Literal["pressure"]
     cavity: str = "cavity"
-    value: Pressure
+    value: Pressure | None = Field(default=None, description="the pressure at the full load, in proportion before")
+    programme: ProgrammeCase | None = Field(default=None, description="or pressures at given times")
 
-    def build(self) -> CavityPressure:
-        """Return the load."""
-        return CavityPressure(self.cavity, self.value)
+    @model_validator(mode="before")
+    @classmethod
+    def _programme_written_out(cls, data: object, info: ValidationInfo) -> object:
+        if not isinstance(data, dict) or "programme" not in data:
+            return data
+        return {**data, "programme": written_out(data["programme"], data.get("cavity", "cavity"), info)}
+
+    @model_validator(mode="after")
+    def _value_or_programme(self) -> Self:
+        if self.value is not None and self.programme is not None:
+            raise invalid("both value and programme are given", expected="only one of the two")
+        return self
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """The pressures given, MPa; empty where the pressure is what it must be."""
+        if self.programme is not None:
+            return self.programme.pressure
+        return () if self.value is None else (self.value,)
+
+    @property
+    def full(self) -> float:
+        """The pressure of largest size that is given, MPa; 0 without any."""
+        return max(self.pressures, key=abs, default=0.0)
+
+    def build(self, duration: float | None = None) -> CavityPressure:
+        """Return the load; `duration` in s is what the load fraction runs over where there are programmes."""
+        if self.programme is not None and duration:
+            return CavityPressure(self.cavity, self.programme.peak, self.programme.over(duration))
+        return CavityPressure(self.cavity, UNKNOWN if self.value is None else self.value)
 
 
 class GravityCase(StrictModel):

@@ -11,12 +11,10 @@ from turgor.fem.system import System
 from turgor.materials import Hyperelastic
 from turgor.materials.assessment import warnings_in_use
 from turgor.mesh import Mesh
+from turgor.solver.control import ATMOSPHERE
 from turgor.study.boundary import GravityCase, PressureCase, TractionCase
 from turgor.study.case import Case
 from turgor.study.setup import check_name
-
-ATMOSPHERE = 0.101325
-"""MPa; a pressure below its negative is no vacuum but an impossibility."""
 
 STIFFEST_SOLID = 5.5e5
 """Shear modulus of diamond, rounded up, MPa."""
@@ -66,20 +64,22 @@ def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
             )
     stiffest = max(material.shear_modulus for material in materials.values())
     for number, load in enumerate(case.loads):
-        key = f"loads.{number}.value"
-        if isinstance(load, PressureCase) and load.value < -ATMOSPHERE:
+        programmed = isinstance(load, PressureCase) and load.programme is not None
+        key = f"loads.{number}.{'programme' if programmed else 'value'}"
+        if isinstance(load, PressureCase) and min(load.pressures, default=0.0) < -ATMOSPHERE:
             raise InputError(
                 "a vacuum cannot be deeper than the pressure of the atmosphere",
                 key=key,
-                value=to_text(load.value, "pressure"),
+                value=to_text(min(load.pressures), "pressure"),
                 expected=f"at least {-ATMOSPHERE} MPa",
             )
-        if isinstance(load, (PressureCase, TractionCase)) and abs(load.value) > MOST_PRESSURE_PER_MODULUS * stiffest:
+        largest = load.full if isinstance(load, PressureCase) else load.value if isinstance(load, TractionCase) else 0.0
+        if abs(largest) > MOST_PRESSURE_PER_MODULUS * stiffest:
             raise InputError(
-                f"this is {abs(load.value) / stiffest:.3g} times the shear modulus of the stiffest material "
+                f"this is {abs(largest) / stiffest:.3g} times the shear modulus of the stiffest material "
                 f"({stiffest:.3g} MPa), and no actuator of it can hold that",
                 key=key,
-                value=to_text(load.value, "pressure"),
+                value=to_text(largest, "pressure"),
                 expected=f"at most {MOST_PRESSURE_PER_MODULUS:g} times the modulus; check both units",
             )
 

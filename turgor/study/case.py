@@ -26,7 +26,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from turgor.common.errors import InputError
-from turgor.common.units import PositiveLength, Pressure
+from turgor.common.units import PositiveLength, to_internal
+from turgor.fem.system import System
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.catalogue import templates
 from turgor.geometry.imported.mesh_file import MeshFile
@@ -36,12 +37,14 @@ from turgor.geometry.imported.stl import StlFile
 from turgor.geometry.space import Space
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
-from turgor.study.boundary import Load, PressureCase
+from turgor.study.boundary import DisplacementCase, Load, PressureCase
+from turgor.study.control import ArcLengthControl, ControlCase, PressureControl
+from turgor.study.course import Course, LoadCourse, course_by
 from turgor.study.materials import FittedMaterial, MaterialChoice, in_case_folder
 from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
-from turgor.study.validation import StrictModel, explain, inlined, invalid, suggestion, under
+from turgor.study.validation import StrictModel, collected, explain, inlined, invalid, suggestion, under
 
 
 def _known() -> dict[str, type[Actuator]]:
@@ -114,6 +117,15 @@ class RegionCase(StrictModel):
     )
 
 
+def _with_unit(value: object) -> object:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        raise invalid("a unit is missing", value=value, expected="a pressure, a time or a volume, such as '12 psi'")
+    return value
+
+
+QuantityText = Annotated[str, BeforeValidator(_with_unit)]
+"""Text with a unit of which the rest of the case says what it measures."""
+
 Count = Annotated[int, Field(strict=True, ge=1)]
 Part = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
 
@@ -122,16 +134,18 @@ class SolverCase(StrictModel):
     """Where on the way to the full load a state is kept, and how accurate it is."""
 
     steps: Count | None = Field(default=None, le=10_000, description="states at equal steps of the load")
-    outputs: tuple[Pressure, ...] | None = Field(default=None, min_length=1, description="or states at these pressures")
+    outputs: tuple[QuantityText, ...] | None = Field(
+        default=None, min_length=1, description="or states at these pressures, times or volumes"
+    )
     tolerance: Part = Field(default=1e-7, le=1e-3, description="residual relative to the largest of the forces in it")
     max_iterations: Count = Field(default=25, le=1000, description="linear solves allowed for one state")
     largest_step: Part = Field(default=1.0, description="longest step, as part of the load")
     smallest_step: Part = Field(default=1e-3, description="shortest step tried before giving up")
 
-    def options(self) -> PathOptions:
+    def options(self, *, post_snap: bool = False) -> PathOptions:
         """Return the options of the load path."""
         newton = NewtonOptions(tolerance=self.tolerance, max_iterations=self.max_iterations)
-        return PathOptions(newton, largest_step=self.largest_step, smallest_step=self.smallest_step)
+        return PathOptions(newton, self.largest_step, self.smallest_step, post_snap)
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
@@ -157,6 +171,9 @@ class Case(Setup):
     largest_stretch: float = Field(
         default=2.0, strict=True, gt=1.0, description="up to which the softest material is examined before the run"
     )
+    control: ControlCase = Field(
+        default=PressureControl(type="pressure"), description="what is prescribed; left out, the loads"
+    )
     solver: SolverCase = SolverCase()
     measures: tuple[MeasureChoice, ...] | None = Field(
         default=None, description="left out, the usual ones that the actuator's names allow"
@@ -174,7 +191,15 @@ class Case(Setup):
         cavities = [load.cavity for load in self.pressures]
         if len(set(cavities)) < len(cavities):
             raise invalid("a cavity is given two pressures", key="loads", expected="one pressure for each cavity")
-        self.fractions()
+        for number, load in enumerate(self.loads):
+            if isinstance(load, PressureCase):
+                self._check_pressure(load, f"loads.{number}")
+        if isinstance(self.control, PressureControl):
+            self.fractions()
+        elif any(isinstance(support, DisplacementCase) for support in self.supports):
+            raise invalid("the supports move with the load, which is not given", key="control", expected=BY_LOADS)
+        elif self.contact is not None and any(body.move is not None for body in self.contact.bodies):
+            raise invalid("a rigid body moves with the load, which is not given", key="control", expected=BY_LOADS)
         return self
 
     @model_validator(mode="after")
@@ -185,6 +210,15 @@ class Case(Setup):
             raise invalid(problem, key=f"mesh.{given[0]}", expected="no mesh keys")
         return self
 
+    def _check_pressure(self, load: PressureCase, key: str) -> None:
+        by_load, given = isinstance(self.control, PressureControl), load.value is not None
+        if load.programme is not None and not by_load:
+            raise invalid("a programme follows time, not a volume", key=f"{key}.programme", expected=BY_LOADS)
+        if load.programme is None and not given and (by_load or isinstance(self.control, ArcLengthControl)):
+            raise invalid("no pressure is given", key=key, expected="value, or programme with times and pressures")
+        if given and load.value == 0.0 and not by_load:
+            raise invalid("the pressure cannot be zero where it is what it must be", key=f"{key}.value")
+
     @property
     def pressures(self) -> tuple[PressureCase, ...]:
         """The loads that are pressures of a cavity."""
@@ -193,23 +227,27 @@ class Case(Setup):
     @property
     def full_pressure(self) -> float:
         """The pressure of largest size at the full load, MPa; 0 without any."""
-        return max((load.value for load in self.pressures), key=abs, default=0.0)
+        return max((load.full for load in self.pressures), key=abs, default=0.0)
 
     def fractions(self) -> tuple[float, ...]:
         """Return the fractions of the load, in (0, 1] and ascending, at which states are asked for."""
         if self.solver.outputs is None:
             return tuple(output_fractions(self.solver.steps or DEFAULT_STEPS))
-        target = self.full_pressure
-        key, expected = (
-            "solver.outputs",
-            "pressures in order from 0 to the load's, the last equal to it",
-        )
+        key = "solver.outputs"
+        if self.duration is not None:
+            what, target, expected = "time", self.duration, "times in order, the last that of the longest programme"
+        else:
+            what, target = "pressure", self.full_pressure
+            expected = "pressures in order from 0 to the load's, the last equal to it"
         if target == 0.0:
             raise invalid("the outputs are pressures, and no load is one", key=key, expected="solver.steps instead")
-        fractions = tuple(pressure / target for pressure in self.solver.outputs)
+        with collected():
+            values = [to_internal(text, what) for text in self.solver.outputs]
+        fractions = tuple(value / target for value in values)
         ascending = all(low < high for low, high in zip((0.0, *fractions), fractions, strict=False))
         if not ascending or fractions[-1] != 1.0:
-            raise invalid("these pressures do not lead from 0 to the load's", key=key, expected=expected)
+            end = "the load's" if what == "pressure" else "the end of the programmes"
+            raise invalid(f"these {what}s do not lead from 0 to {end}", key=key, expected=expected)
         return fractions
 
     @property
@@ -221,6 +259,23 @@ class Case(Setup):
         data = self.model_dump(mode="json", exclude_none=True, include={"geometry", "regions"})
         measured = [path for choice in self.measures or () for path in choice.files]
         return list(dict.fromkeys([*tests, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
+
+    def course(self, system: System) -> Course:
+        """Return the course of the run: which states are asked for, and how the solver gets there.
+
+        Raises
+        ------
+        InputError
+            If the control does not fit the system or the outputs do not lead to its target.
+        """
+        steps = self.solver.steps or DEFAULT_STEPS
+        if isinstance(self.control, PressureControl):
+            options = self.solver.options(post_snap=self.control.at_limit == "post-snap")
+            return LoadCourse(system, self.fractions(), options, self.duration)
+        if self.solver.outputs is not None and isinstance(self.control, ArcLengthControl):
+            expected = "solver.steps: the states lie one over so many of the way apart"
+            raise InputError("a path by its length has no outputs", key="solver.outputs", expected=expected)
+        return course_by(self.control, system, self.solver.outputs, steps, self.solver.options())
 
     def to_yaml(self, files: Mapping[Path, str] | None = None) -> str:
         """Return the resolved case as YAML that :func:`load_case` reads back to the same case.
@@ -251,6 +306,7 @@ def _with_file(data: Any) -> Iterator[dict[str, Any]]:
 
 
 DEFAULT_STEPS = 10
+BY_LOADS = "control by the loads (control.type: pressure)"
 _FIRST = ("name", "geometry", "materials", "mesh")
 """What a reader of the resolved case looks for first."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")

@@ -20,6 +20,7 @@ from turgor.results.report import report
 from turgor.results.store import RunStore
 from turgor.results.stored import Body, StoredState
 from turgor.results.summary import Summary, summarise
+from turgor.solver.events import Outcome
 from turgor.study.machine import peak_memory_mb
 from turgor.study.validation import suggestion
 
@@ -139,13 +140,19 @@ class Path:
         return None if None in answers else all(answers)
 
     @property
+    def reached(self) -> bool:
+        """Whether the last step is the target."""
+        return bool(self.records) and self.records[-1].fraction == 1.0
+
+    @property
     def summary(self) -> Summary:
         """The numbers of the last step, the mesh and the solver, as in ``summary.json``."""
         return summarise(
             self.history,
             self.mesh,
-            converged=bool(self.records) and self.records[-1].fraction == 1.0,
-            reason="the full load was reached",
+            converged=self.reached,
+            reason="the target was reached" if self.reached else "the path ends before its target",
+            outcome=Outcome.REACHED if self.reached else Outcome.UNEXPLAINED,
             dofs=self.dofs,
             wall_s=sum(record.solver["wall_s"] for record in self.records),
             peak_memory_mb=peak_memory_mb(),

@@ -6,7 +6,7 @@ Every state is on the disk before the next one begins, so that a run that was ki
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,13 +23,16 @@ from turgor.mesh.generate import generate
 from turgor.mesh.imported import read_actuator
 from turgor.mesh.named_parts import save_fault, save_named_parts
 from turgor.mesh.partition import partition
+from turgor.results.archive import Row
 from turgor.results.report import report
 from turgor.results.store import RunStore
 from turgor.results.summary import Summary, summarise
+from turgor.solver.events import Event, Outcome
 from turgor.solver.newton import Equilibrium
-from turgor.solver.path import solve_path
+from turgor.solver.stops import StoppedShortError
 from turgor.study.build import check_names, check_sizes, doubts, system_of
 from turgor.study.case import Case, MeshCase
+from turgor.study.course import Course
 from turgor.study.datafiles import copy_data, data_names, same_data
 from turgor.study.fitting import fit_document
 from turgor.study.machine import peak_memory_mb
@@ -179,13 +182,14 @@ class _Running:
             mesh = stored.mesh if stored else self._meshed()
             self.show.stage("system")
             system = system_of(self.case, mesh, materials)
+            course = self.case.course(system)
             # Nothing is written before everything that can be checked has been.
             with stored or self._created(mesh) as store:
                 self.run_log.write_to(self.folder / "run.log", append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
                 if fit:
                     store.write_fit(fit_document(fit))
-                stop = self._walk(system, store)
+                stop = self._walk(system, course, store)
                 summary = self._summary(system, store, stop)
                 store.finish(summary)
         self.show.stage("report")
@@ -224,24 +228,16 @@ class _Running:
         log.info("resuming behind step %d", store.n_steps)
         return store
 
-    def _walk(self, system: System, store: RunStore) -> SolverError | None:
-        """Follow the load path; return what stopped it short, or ``None`` if it reached the end."""
-        fractions = self.case.fractions()
+    def _walk(self, system: System, course: Course, store: RunStore) -> SolverError | None:
+        """Follow the path; return what stopped it short, or ``None`` if it reached the end."""
         last = store.last()
         start = to_equilibrium(system, last) if last else None
-        if last and last.fraction >= fractions[-1]:
+        if last and last.fraction >= 1.0:
             return None
         self.show.stage("load")
-        recorder = Recorder(system, store.n_steps)
+        recorder = Recorder(system, store.n_steps, course)
         try:
-            solve_path(
-                system,
-                fractions,
-                options=self.case.solver.options(),
-                start=start,
-                on_equilibrium=lambda equilibrium: self._keep(recorder, store, equilibrium),
-                on_progress=self._tell,
-            )
+            course.walk(start, lambda equilibrium: self._keep(recorder, store, equilibrium), self._tell)
         except SolverError as error:
             log.error("%s %s", error, error.facts)
             return error
@@ -258,7 +254,9 @@ class _Running:
         recorder.begin()
         text = ", ".join(_load_text(name, value) for name, value in record.loads.items())
         log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
-        self.show.advance(equilibrium.fraction, text)
+        if equilibrium.event is not None:
+            log.warning("%s at %s", equilibrium.event, text)
+        self.show.advance(record.fraction, text)
 
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
@@ -268,13 +266,36 @@ class _Running:
             store.history,
             store.mesh,
             converged=stop is None,
-            reason=str(stop) if stop else "the full load was reached",
+            reason=str(stop) if stop else _reached(store.history),
+            outcome=_outcome(stop, store.history),
             dofs=system.n_dofs,
             wall_s=time.perf_counter() - self.begun,
             peak_memory_mb=peak_memory_mb(),
         )
         last = store.last()
         return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})
+
+
+def _outcome(stop: SolverError | None, history: Sequence[Row]) -> Outcome:
+    if stop is not None:
+        return stop.outcome if isinstance(stop, StoppedShortError) else Outcome.UNEXPLAINED
+    bifurcated = bool(history) and history[-1]["stable"] is False and _bifurcation(history) is not None
+    return Outcome.BIFURCATION if bifurcated else Outcome.REACHED
+
+
+def _reached(history: Sequence[Row]) -> str:
+    met = _bifurcation(history)
+    if met is None:
+        return "the target was reached"
+    place = f"{met['pressure_kPa']:.4g} kPa" if "pressure_kPa" in met else f"{met['fraction']:.4g} of the load"
+    return (
+        f"the target was reached, but at {place} the path bifurcates: the states behind it follow a branch that is "
+        "unstable. A small force or flaw along the mode that is stored there shows the branch that is taken"
+    )
+
+
+def _bifurcation(history: Sequence[Row]) -> Row | None:
+    return next((row for row in history if row.get("event") == Event.BIFURCATION), None)
 
 
 def _load_text(name: str, value: float) -> str:

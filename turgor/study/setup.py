@@ -91,8 +91,15 @@ class Setup(StrictModel):
             contact=self.contact.build() if self.contact else [],
         )
 
-    @staticmethod
-    def _load(load: Load, mesh: Mesh) -> fem_loads.Load:
+    @property
+    def duration(self) -> float | None:
+        """The time that the load fraction runs over, s, where loads follow programmes: the longest of them."""
+        programmes = [load.programme for load in self.loads if isinstance(load, PressureCase)]
+        return max((programme.duration for programme in programmes if programme is not None), default=None)
+
+    def _load(self, load: Load, mesh: Mesh) -> fem_loads.Load:
+        if isinstance(load, PressureCase):
+            return load.build(self.duration)
         return load.build(mesh.dimension) if isinstance(load, GravityCase) else load.build()
 
     def _reinforcements(self, mesh: Mesh) -> list[Reinforcement]:

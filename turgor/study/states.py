@@ -18,10 +18,16 @@ from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.results.record import StepRecord
 from turgor.solver.newton import Equilibrium
+from turgor.study.course import Course
 
 
 def to_record(
-    system: System, equilibrium: Equilibrium, index: int, wall_s: float, between: Sequence[Interface]
+    system: System,
+    equilibrium: Equilibrium,
+    index: int,
+    wall_s: float,
+    between: Sequence[Interface],
+    course: Course | None = None,
 ) -> StepRecord:
     """Return the record of an equilibrium.
 
@@ -37,12 +43,16 @@ def to_record(
         Duration of the step in s.
     between
         The interfaces of two materials.
+    course
+        What the run prescribes; left out, the loads.
     """
     state = equilibrium.state
+    fraction = equilibrium.fraction if course is None else course.parameter(equilibrium)
+    duration = None if course is None else course.duration
     stress = von_mises(system, state)
     return StepRecord(
         index=index,
-        fraction=equilibrium.fraction,
+        fraction=fraction,
         loads={name: float(value) for name, value in zip(system.load_names, state.loads, strict=True)},
         displacement=state.u,
         element_pressure=system.element_pressure(state),
@@ -54,13 +64,17 @@ def to_record(
         solver={
             "iterations": equilibrium.iterations,
             "factorisations": equilibrium.factorisations,
-            "stable": equilibrium.stable,
+            "stable": equilibrium.stable if course is None else course.stable(equilibrium),
             "residual": float(equilibrium.residuals[-1]),
             "wall_s": wall_s,
             "contact_penalty": state.penalty,
             "contact_grips": [rows.tolist() for rows in state.grips],
+            "load_fraction": equilibrium.fraction,
+            "event": equilibrium.event or "",
+            **({} if duration is None else {"time_s": duration * fraction}),
         },
         standing=standing(system, state, between),
+        mode=equilibrium.mode,
     )
 
 
@@ -73,11 +87,14 @@ class Recorder:
         The system they are states of.
     first
         Number of the first record.
+    course
+        What the run prescribes; left out, the loads.
     """
 
-    def __init__(self, system: System, first: int = 0) -> None:
+    def __init__(self, system: System, first: int = 0, course: Course | None = None) -> None:
         self.system = system
         self._between = interfaces(system)
+        self.course = course
         self._next = first
         self.begin()
 
@@ -88,7 +105,7 @@ class Recorder:
     def record(self, equilibrium: Equilibrium) -> StepRecord:
         """Return the record of the next step."""
         wall_s = time.perf_counter() - self._begun
-        made = to_record(self.system, equilibrium, self._next, wall_s, self._between)
+        made = to_record(self.system, equilibrium, self._next, wall_s, self._between, self.course)
         self._next += 1
         self.begin()
         return made
@@ -140,4 +157,5 @@ def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)
-    return Equilibrium(state, record.fraction, (record.solver["residual"],), 0, pivots)
+    fraction = record.solver.get("load_fraction", record.fraction)
+    return Equilibrium(state, fraction, (record.solver["residual"],), 0, pivots)

@@ -1,0 +1,138 @@
+"""Control by volume, air, arc length and programmes in case files and from Python, and how a run says that it ended."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+import turgor as tg
+from turgor.fem.cavity import Cavity
+from turgor.results import plots
+from turgor.results.store import RunStore
+from turgor.study.case import load_case
+from turgor.study.run import Run, run
+
+FREE = "loads=[{type: pressure, cavity: cavity}]"
+SURROUNDINGS = 101.325
+LIMIT = 33.8865
+"""Limit pressure of the small tube on its mesh, kPa, found by pressure control."""
+
+
+@pytest.fixture(autouse=True)
+def unreported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the report out: its pictures take longer than the solver."""
+    monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
+
+
+def ran(small_tube: Path, *changes: str) -> tuple[Run, list[dict[str, str]]]:
+    done = run(load_case(small_tube, changes), small_tube.parent / "run", overwrite=True)
+    with (done.folder / "history.csv").open(encoding="utf-8") as stream:
+        return done, list(csv.DictReader(stream))
+
+
+def column(rows: list[dict[str, str]], key: str) -> np.ndarray:
+    return np.array([float(row[key]) for row in rows])
+
+
+def rest_volume(done: Run) -> float:
+    mesh = RunStore.open(done.folder).mesh
+    return Cavity(mesh.points, mesh.surface("cavity"), 0, "cavity").volume(np.zeros_like(mesh.points))
+
+
+def test_volumes_are_hit_and_the_run_goes_on_where_it_was_cut(small_tube: Path) -> None:
+    changes = [FREE, "control={type: volume, target: 400 %}", "solver={outputs: [200 %, 400 %]}"]
+    done, rows = ran(small_tube, *changes)
+    asked = [row for row in rows if not row["event"]]
+    rest = rest_volume(done)
+    assert column(asked, "cavity_volume_mm3") / rest == pytest.approx([2.0, 4.0], rel=1e-5)
+    assert [row["event"] for row in rows] == ["", "limit-pressure", ""]
+    pressure = column(rows, "pressure_kPa")
+    assert pressure[1] == pressure.max() > pressure[2]
+    assert pressure[1] == pytest.approx(LIMIT, rel=1e-4)
+    assert column(rows, "fraction")[-1] == 1.0
+    assert all(row["stable"] in ("true", "") for row in rows)
+    summary = done.summary
+    assert (summary["converged"], summary["outcome"]) == (True, "target-reached")
+    (event,) = summary["events"]
+    assert event["step"] == 1
+    # the mode is there for ParaView and in the archive, in the step of the limit alone
+    stored = RunStore.open(done.folder)
+    mode = stored.load(1).mode
+    assert mode is not None
+    assert np.abs(mode).max() == pytest.approx(1.0)
+    assert "mode" in meshio.read(done.folder / "steps" / "0001.vtu").point_data
+    assert stored.load(2).mode is None
+    # the curve of pressure over volume is the first one in the report, and falls
+    curve = plots.load_motion(stored.history).data[0]
+    assert list(curve.y) == pytest.approx(list(pressure))
+    for file in ("0001", "0002"):
+        for end in ("npz", "vtu"):
+            (done.folder / "steps" / f"{file}.{end}").unlink()
+    again = run(load_case(small_tube, changes), done.folder, resume=True)
+    assert again.summary["final"]["pressure_kPa"] == pytest.approx(pressure[2], rel=1e-6)
+    assert [e["event"] for e in again.summary["events"]] == ["limit-pressure"]
+
+
+def test_air_obeys_boyle(small_tube: Path) -> None:
+    done, rows = ran(small_tube, FREE, "control={type: air, target: 300 %}", "solver.steps=2")
+    amount = (column(rows, "pressure_kPa") + SURROUNDINGS) * column(rows, "cavity_volume_mm3")
+    assert amount / (SURROUNDINGS * rest_volume(done)) == pytest.approx([2.0, 3.0], rel=1e-5)
+
+
+def test_arc_length_meets_the_same_limit(small_tube: Path) -> None:
+    done, rows = ran(small_tube, "control={type: arc-length, target: 400 %}", "solver.steps=2")
+    assert rows[-1]["fraction"] == "1.0"
+    assert done.summary["final"]["cavity_volume_mm3"] == pytest.approx(4.0 * rest_volume(done), rel=1e-5)
+    assert done.summary["events"][0]["pressure_kPa"] == pytest.approx(LIMIT, rel=1e-4)
+
+
+def test_a_programme_goes_up_and_down(small_tube: Path) -> None:
+    table = small_tube.with_name("pressures.csv")
+    table.write_text("Time [ms];Cavity [psi]\n0;0\n1000;2\n2000;2\n4000;0.5\n", encoding="utf-8")
+    changes = ["loads=[{type: pressure, programme: {file: pressures.csv}}]", "solver={outputs: [0.5 s, 3 s, 4 s]}"]
+    done, rows = ran(small_tube, *changes)
+    assert column(rows, "time_s") == pytest.approx([0.5, 3.0, 4.0])
+    psi = 6.894757
+    assert column(rows, "pressure_kPa") == pytest.approx([psi, 1.25 * psi, 0.5 * psi], rel=1e-6)
+    volume = column(rows, "cavity_volume_mm3")
+    assert volume[1] > volume[0] > volume[2]
+    # the resolved case holds the table itself
+    table.unlink()
+    again = load_case(done.folder / "case.yaml")
+    assert again.pressures[0].programme == load_case(done.folder / "case.yaml").pressures[0].programme
+    assert again.duration == 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time (s),outer (kPa)\n0,0\n1,2\n", "no column 'cavity' or 'pressure'"),
+        ("time,cavity (kPa)\n0,0\n1,2\n", "unit is missing"),
+        ("time (s),cavity (mm)\n0,0\n1,2\n", "not a unit of pressure"),
+        ("time (s),cavity (kPa)\n0,0\n1,\n", "a number is missing"),
+        ("time (s),cavity (kPa)\n0,0\n1,two\n", "not a number"),
+        ("time (s),cavity (kPa)\n0,0\n2,1\n1,2\n", "ascend"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(small_tube: Path, text: str, words: str) -> None:
+    small_tube.with_name("pressures.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(tg.InputError, match=words):
+        load_case(small_tube, ["loads=[{type: pressure, programme: {file: pressures.csv}}]"])
+
+
+def test_the_python_story_has_volume_and_programmes_too() -> None:
+    mesh = tg.CappedTube(inner_radius="6 mm", wall="3 mm", length="40 mm", cap="6 mm").mesh(size="6 mm")
+    model = tg.Model(mesh, body=tg.material("neo-hookean", {"C10": "0.05 MPa"}))
+    grown = model.inflate_to("150 %", steps=2)
+    assert grown.reached
+    volume = grown.cavity_volume.magnitude
+    assert volume[1] / volume[0] == pytest.approx(1.5 / 1.25, rel=1e-5)
+    played = model.play({"cavity": {"time": ["0 s", "1 s", "2 s"], "pressure": ["0 kPa", "10 kPa", "5 kPa"]}}, steps=4)
+    assert played.pressure.magnitude == pytest.approx([5.0, 10.0, 7.5, 5.0])
+    assert played.series("time").magnitude == pytest.approx([0.5, 1.0, 1.5, 2.0])
+    with pytest.raises(tg.InputError, match="volume"):
+        model.inflate_to("150")
