@@ -84,7 +84,7 @@ def test_air_obeys_boyle(small_tube: Path) -> None:
 
 
 def test_arc_length_meets_the_same_limit(small_tube: Path) -> None:
-    done, rows = ran(small_tube, "control={type: arc-length, target: 400 %}", "solver.steps=2")
+    done, rows = ran(small_tube, "control={type: arc-length, target: 400 %}", "solver.steps=1")
     assert rows[-1]["fraction"] == "1.0"
     assert done.summary["final"]["cavity_volume_mm3"] == pytest.approx(4.0 * rest_volume(done), rel=1e-5)
     assert done.summary["events"][0]["pressure_kPa"] == pytest.approx(LIMIT, rel=1e-4)

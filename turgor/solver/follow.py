@@ -75,7 +75,7 @@ def follow(
     begin = walk.measure(walk.here)
     sign = _direction(begin, targets, start is not None)
     walk.step = walk.first_step = sign * _first_step(begin, targets)
-    post = _Post(on_equilibrium)
+    post = _Post(walk.here, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
     for target in targets:
@@ -91,7 +91,7 @@ def follow(
             if previous.rising != found.rising:
                 post.send_limit(walk.limit_between(previous, found))
                 walk.before, walk.here = previous, found
-        if not post.tally.is_empty:
+        if walk.here is not post.last:
             post.send(walk.here)
     return post.sent
 
@@ -136,7 +136,7 @@ def follow_arc(
     rest = volume.value(system.conjugate(system.reference_state(), volume.weights), 0.0)
     scale = abs(target - rest)
     sign = _direction(walk.measure(walk.here), [target], start is not None)
-    post = _Post(on_equilibrium)
+    post = _Post(walk.here, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
     arc = _Arc(walk, sign, scale, length)
@@ -219,13 +219,15 @@ class _Arc:
 class _Post:
     """Hands out equilibria with the work that led to them, and remembers them."""
 
-    def __init__(self, on_equilibrium: OnEquilibrium | None) -> None:
+    def __init__(self, start: Equilibrium, on_equilibrium: OnEquilibrium | None) -> None:
         self.tally = Tally()
+        self.last = start
         self.sent: list[Equilibrium] = []
         self._on_equilibrium = on_equilibrium
 
     def send(self, equilibrium: Equilibrium) -> None:
         """Hand out an equilibrium."""
+        self.last = equilibrium
         self.sent.append(self.tally.closed(equilibrium))
         if self._on_equilibrium is not None:
             self._on_equilibrium(self.sent[-1])
@@ -273,7 +275,7 @@ def _rounding(target: float) -> float:
 
 
 def _ended(walk: VolumeWalk, post: _Post) -> StoppedShortError:
-    if not post.tally.is_empty:
+    if walk.here is not post.last:
         post.send(walk.here)
     return stopped(walk.system, walk.here, walk.failure or NotConvergedError("the path turns back"))
 
