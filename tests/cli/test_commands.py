@@ -90,7 +90,7 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(tmp_path: Path, monkey
     def interrupted(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("turgor.study.run.solve_path", interrupted)
+    monkeypatch.setattr("turgor.study.course.solve_path", interrupted)
     result = turgor("run", SMALL, "--out", tmp_path / "run")
     assert result.exit_code == 130
     assert "turgor: interrupted; 0 finished steps" in result.stderr
@@ -101,7 +101,7 @@ def test_an_unexpected_failure_leaves_one_line_and_a_log(tmp_path: Path, monkeyp
     def broken(*arguments: object, **options: object) -> None:
         raise ZeroDivisionError("a flaw\nin two lines")
 
-    monkeypatch.setattr("turgor.study.run.solve_path", broken)
+    monkeypatch.setattr("turgor.study.course.solve_path", broken)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     result = turgor("run", SMALL, "--out", tmp_path / "run")
     assert result.exit_code == 1

@@ -76,7 +76,7 @@ def test_history_has_a_row_a_step_with_units(run_folder: Path) -> None:
     assert {"max_displacement_mm", "max_von_mises_MPa", "von_mises_p99_MPa", "cavity_volume_mm3", "twist_deg"} < set(
         rows[0]
     )
-    assert list(rows[0])[-5:] == ["iterations", "factorisations", "stable", "residual", "wall_s"]
+    assert list(rows[0])[-6:] == ["iterations", "factorisations", "stable", "residual", "wall_s", "event"]
     assert [row["bending_angle_deg"] for row in RunStore.open(run_folder).history] == pytest.approx(
         [40, 80, 120, 160, 200]
     )
@@ -84,7 +84,7 @@ def test_history_has_a_row_a_step_with_units(run_folder: Path) -> None:
 
 def test_summary_has_the_keys_of_the_contract(run_folder: Path) -> None:
     summary = json.loads((run_folder / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == ["converged", "reason", "final", "mesh", "solver", "versions"]
+    assert list(summary) == ["converged", "reason", "outcome", "final", "mesh", "solver", "versions"]
     assert summary["mesh"].keys() == {"elements", "nodes", "dofs"}
     solver = {"steps", "iterations", "factorisations", "wall_s", "peak_memory_MB", "stable"}
     assert summary["solver"].keys() == solver

@@ -18,7 +18,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -289,11 +290,18 @@ class RunStore:
             (self.folder / _CURVES).mkdir(exist_ok=True)
             write_text(self.folder / _CURVES / f"{title}.csv", as_csv(rows))
         sets = "".join(
-            f'    <DataSet timestep="{entry["fraction"]!r}" file={quoteattr(f"{_STEPS}/{index:04d}.vtu")}/>\n'
-            for index, entry in enumerate(self._rows)
+            f'    <DataSet timestep="{time!r}" file={quoteattr(f"{_STEPS}/{index:04d}.vtu")}/>\n'
+            for index, time in enumerate(_times(self._rows))
         )
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
         write_text(self.folder / _PVD, f"{head}{sets}  </Collection>\n</VTKFile>\n")
+
+
+def _times(rows: Sequence[Row]) -> list[float]:
+    """Return ParaView's time of each step: the load parameter, or the step's number where that does not grow."""
+    fractions = [float(entry["fraction"]) for entry in rows]
+    ascend = all(later > earlier for earlier, later in itertools.pairwise(fractions))
+    return fractions if ascend else [float(index) for index in range(len(rows))]
 
 
 @contextmanager
