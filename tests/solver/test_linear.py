@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import psutil
 import pytest
 import scipy.sparse as sp
 
@@ -50,3 +53,21 @@ def test_singular_matrix_is_reported_by_superlu():
     start, column, values = upper_pattern(np.array([[1.0, 1.0], [1.0, 1.0]]))
     with pytest.raises(SingularMatrixError, match="singular"):
         SuperLU(start, column).factorise(values)
+
+
+@pytest.mark.skipif(solver_in_use() is not Pardiso, reason="only PARDISO tells beforehand")
+def test_memory_is_known_before_it_is_taken_and_a_lack_of_it_said(monkeypatch, caplog):
+    def membrane(n: int) -> Pardiso:
+        line = sp.diags([2.0, -1.0], [0, 1], (n, n))
+        upper = (sp.kron(sp.identity(n), line) + sp.kron(line, sp.identity(n))).tocsr()
+        solver = Pardiso(upper.indptr.astype(np.int32), upper.indices.astype(np.int32))
+        solver.factorise(upper.data)
+        return solver
+
+    # Nested dissection of an n × n grid leaves factors of about 31/4 n² log2 n entries (George 1973).
+    factors_mb = 8 * 7.75 * 200**2 * np.log2(200) / 2**20
+    assert 0.5 * factors_mb < membrane(200).memory_mb < 5 * factors_mb
+    assert not caplog.records
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**20))
+    membrane(200)
+    assert "1 MB are free" in caplog.text

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
+import psutil
 import scipy.sparse as sp
 import scipy.sparse.linalg
 from numpy.typing import NDArray
@@ -84,6 +85,18 @@ def solver_in_use() -> type[LinearSolver]:
     return SuperLU if _mkl() is None else Pardiso
 
 
+def warn_of_memory(needed_mb: float) -> None:
+    """Say in the log before a factorisation that it takes more memory, MB, than the machine has free."""
+    free_mb = psutil.virtual_memory().available / 2**20
+    if needed_mb > free_mb:
+        log.warning(
+            "the factorisation needs about %.0f MB of memory and %.0f MB are free: the run may be slow or be ended by "
+            "the system; a coarser mesh or a symmetric half needs less",
+            needed_mb,
+            free_mb,
+        )
+
+
 _SYMMETRIC_INDEFINITE = -2
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
 
@@ -127,6 +140,7 @@ class Pardiso(LinearSolver):
         if not self._analysed:
             self._call(_ANALYSE)
             self._analysed = True
+            warn_of_memory(self.memory_mb)
             matrix = (_EMPTY, self.row_start, self.column)
             self._release = weakref.finalize(
                 self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
@@ -143,6 +157,12 @@ class Pardiso(LinearSolver):
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues."""
         return int(self._control[22])
+
+    @property
+    def memory_mb(self) -> float:
+        """Most memory, MB, that ordering, factors and solution take together; known once the pattern is analysed."""
+        ordering, kept, factors = (float(kilobytes) for kilobytes in self._control[14:17])
+        return max(ordering, kept + factors) / 2**10
 
     def _call(self, phase: int, right: Floats | None = None, solution: Floats | None = None) -> None:
         error = _pardiso_call(
