@@ -9,7 +9,9 @@ import psutil
 import pytest
 import scipy.sparse as sp
 
-from turgor.solver.linear import Pardiso, SingularMatrixError, SuperLU, make_linear_solver, solver_in_use
+from turgor.common.optional import is_available
+from turgor.solver import linear
+from turgor.solver.linear import Mumps, Pardiso, SingularMatrixError, SuperLU, solver_in_use
 
 
 def upper_pattern(matrix):
@@ -25,7 +27,11 @@ def matrix():
     return dense + dense.T + np.diag(rng.uniform(5, 10, 60))
 
 
-KINDS = [SuperLU] + ([Pardiso] if solver_in_use() is Pardiso else [])
+KINDS = [
+    SuperLU,
+    pytest.param(Mumps, marks=pytest.mark.skipif(not is_available("mumps"), reason="MUMPS is not installed")),
+    pytest.param(Pardiso, marks=pytest.mark.skipif(solver_in_use() is not Pardiso, reason="MKL is not installed")),
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -38,15 +44,22 @@ def test_solution(kind, matrix):
         np.testing.assert_allclose(solver.solve(right), np.linalg.solve(scale * matrix, right), rtol=1e-9)
 
 
-def test_inertia(matrix):
+@pytest.mark.parametrize("kind", KINDS)
+def test_inertia(kind, matrix):
     shifted = matrix - 8.0 * np.eye(60)
     expected = int((np.linalg.eigvalsh(shifted) < 0).sum())
     assert 0 < expected < 60
     start, column, values = upper_pattern(shifted)
-    solver = make_linear_solver(start, column)
+    solver = kind(start, column)
     solver.factorise(values)
-    assert solver.negative_pivots in (expected, None)
-    assert (solver.negative_pivots is None) == isinstance(solver, SuperLU)
+    assert solver.negative_pivots == (None if kind is SuperLU else expected)
+
+
+def test_the_fastest_solver_that_is_installed_is_chosen(monkeypatch):
+    monkeypatch.setattr(linear, "_mkl", lambda: None)
+    for mumps, expected in ((True, Mumps), (False, SuperLU)):
+        monkeypatch.setattr(linear, "is_available", lambda name, answer=mumps: answer and name == "mumps")
+        assert solver_in_use() is expected
 
 
 def test_singular_matrix_is_reported_by_superlu():

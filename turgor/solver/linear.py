@@ -1,6 +1,6 @@
 """Symmetric linear solvers behind one class: analyse a pattern once, factorise values, solve.
 
-MKL's PARDISO where it is installed, SuperLU from SciPy where it is not.
+MKL's PARDISO where it is installed; else MUMPS if its Python package is; else SuperLU from SciPy.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from turgor.common.errors import SolverError
 from turgor.common.log import logger
+from turgor.common.optional import is_available, require
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -82,7 +83,9 @@ def make_linear_solver(row_start: Ints, column: Ints) -> LinearSolver:
 
 def solver_in_use() -> type[LinearSolver]:
     """Return the class of the solver that :func:`make_linear_solver` chooses on this machine."""
-    return SuperLU if _mkl() is None else Pardiso
+    if _mkl() is not None:
+        return Pardiso
+    return Mumps if is_available("mumps") else SuperLU
 
 
 def warn_of_memory(needed_mb: float) -> None:
@@ -218,6 +221,39 @@ def _pardiso_call(
         ctypes.byref(error),
     )
     return error.value
+
+
+class Mumps(LinearSolver):
+    """MUMPS for symmetric indefinite matrices (Amestoy et al. 2001): for processors that MKL is not made for.
+
+    The ordering is made once. How fast it is depends on the BLAS that it was built with.
+    """
+
+    name = "MUMPS"
+
+    def take(self, row_start: Ints, column: Ints) -> None:
+        """Begin anew with another pattern."""
+        super().take(row_start, column)
+        self._row = np.repeat(np.arange(self.n, dtype=np.int32), np.diff(row_start))
+        self._context: Any = require("mumps").Context()
+
+    def factorise(self, values: Floats) -> None:
+        """Factorise; the first call also orders and analyses the pattern."""
+        upper = sp.coo_array((values, (self._row, self.column)), shape=(self.n, self.n))
+        self._context.set_matrix(upper, symmetric=True)
+        try:
+            self._context.factor(reuse_analysis=self._context.analyzed)
+        except require("mumps").MUMPSError as error:
+            raise SingularMatrixError(f"the stiffness matrix could not be factorised ({error})") from error
+
+    def solve(self, right: Floats) -> Floats:
+        """Solve with the newest factors."""
+        return np.asarray(self._context.solve(right))
+
+    @property
+    def negative_pivots(self) -> int:
+        """Number of negative eigenvalues."""
+        return int(self._context.mumps_instance.infog[12])
 
 
 class SuperLU(LinearSolver):
