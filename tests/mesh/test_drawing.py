@@ -15,7 +15,7 @@ CHOICES = {"model", "symmetric"}
 OTHERS = {
     "bellows": {"convolutions": 1, "model": "axisymmetric"},
     "fibre-tube": {"tilt": "0 deg", "fibres": 3, "winding": "both"},
-    "honeycomb": {"columns": 1, "rows": 1, "model": "plane"},
+    "honeycomb": {"columns": 1, "rows": 1, "model": "plane", "plate": "2 mm"},
     "membrane": {"segments": 1, "model": "plane"},
     "pneunet": {"chambers": 1, "second_layer": "0 mm"},
     "reinforced-tube": {"rings": 2, "symmetric": True},

@@ -251,6 +251,26 @@ def test_a_section_turned_about_its_axis_is_the_body(name):
     assert turned.sum() == pytest.approx(EXACT[name](shape.changed(model="full"))[1], rel=1e-4)
 
 
+@pytest.mark.parametrize("model", ["plane", "half"])
+def test_a_plate_ties_the_columns_of_a_honeycomb_together(model):
+    comb = actuator("honeycomb", columns=2, rows=1, model=model)
+    plated = comb.changed(plate="2 mm")
+    mesh = generate(plated)
+    deep = 1.0 if model == "plane" else plated.depth / 2
+    box = (plated.cell_width + plated.web_length) * (2.0 + plated.thickness / 2)
+    assert mesh.volume("plate") == pytest.approx(box * deep, rel=1e-6)
+    air, solid = honeycomb_volumes(comb)
+    assert mesh.enclosed_volume("cavity-1") == pytest.approx(air / 2, rel=1e-3)
+    # What the plate takes of the walls: half of the flats, and a little where these turn down.
+    flats = 2 * plated.web_length * plated.thickness / 2 * deep
+    assert flats < solid - mesh.volume("body") < 1.05 * flats
+    top = mesh.points[mesh.surface_nodes("tip-face"), -1]
+    assert np.ptp(top) < 1e-9
+    assert top[0] == pytest.approx(plated.height + 2.0)
+    if model == "half":
+        assert_sound(mesh)
+
+
 @pytest.mark.parametrize("section", ["triangle", "half-round"])
 def test_sides_that_just_meet_end_in_a_line(section):
     sizes = {"chamber_width": "3 mm", "chamber_height": "3.562 mm", "side_wall": "1 mm", "tunnel_width": "1 mm"}

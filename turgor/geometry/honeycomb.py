@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from turgor.common.errors import InputError
-from turgor.common.units import PositiveLength
+from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
 from turgor.geometry.drawing import AIR, OUTSIDE, Distance, Mark, Pointer, View, along, rectangle
-from turgor.geometry.path import Piece, rounded_polygon
+from turgor.geometry.path import Piece, polygon, rounded_polygon
 from turgor.geometry.section import PlaneSection
 
 _PAPER = "Design and Analysis of a Hyperelastic Pneumatic Honeycomb Network Made of Ecoflex 00-35, section 3.1"
@@ -26,9 +26,13 @@ class Honeycomb(Actuator):
     Cells of a column share the walls between them; neighbouring columns meet at the corners of their cells. The rooms
     between four cells are open to the outside.
 
-    Region ``body``; surfaces ``mount`` (the flats at the bottom), ``tip-face`` (those on top), ``cavity-1``,
-    ``cavity-2``, … (all cells of the first, second, … column along x, which share one pressure), ``outer`` and, of the
-    half model, ``symmetry``; markers ``base`` and ``tip`` (middle of the middle column's bottom and top at y = 0).
+    A plate may lie on top, of a stiffer material, so that the columns end in one rigid body as in the paper. It reaches
+    from the first to the last flat and down to the middle of their walls: there it meets the slanted ones at an angle.
+
+    Regions ``body`` and ``plate``; surfaces ``mount`` (the flats at the bottom), ``tip-face`` (those on top, or the
+    plate's top), ``cavity-1``, ``cavity-2``, … (all cells of the first, second, … column along x, which share one
+    pressure), ``outer`` and, of the half model, ``symmetry``; markers ``base`` and ``tip`` (middle of the middle column,
+    at the bottom and on top, y = 0).
     """
 
     template: ClassVar[str] = "honeycomb"
@@ -48,6 +52,9 @@ class Honeycomb(Actuator):
     rounding: PositiveLength = parameter("0.5 mm", "radius of all corners", f"{_PAPER} ties it to d; half of d assumed")
     depth: PositiveLength = parameter("20 mm", "extent along y, end walls included", _ASSUMED)
     end_wall: PositiveLength = parameter("1 mm", "thickness of the walls that close the cells along y", _ASSUMED)
+    plate: NonNegativeLength = parameter(
+        "0 mm", "thickness of a plate above the flats on top, region 'plate'; 0: none", _ASSUMED
+    )
     model: Literal["full", "half", "plane"] = parameter(
         "full",
         "the whole, the half y ≥ 0 with the surface 'symmetry', or the section in the plane of x and z",
@@ -68,7 +75,7 @@ class Honeycomb(Actuator):
 
     @property
     def height(self) -> float:
-        """Overall height in mm."""
+        """Height of the network in mm, without a plate on top."""
         return float(self.rows * self.cell_height + self.thickness)
 
     @property
@@ -127,14 +134,20 @@ class Honeycomb(Actuator):
             *((OUTSIDE, along(room)) for room in rooms),
             *((AIR, along(cell)) for cell in cells),
         ]
-        right, height = self.columns * self.cell_width, self.height
+        right, height = self.columns * self.cell_width, self.height + self.plate
         middle = (self.columns // 2 + 0.5) * self.cell_width
+        left, end, low, high = self._plate_box()
+        plate: Mark = Pointer("plate", (end, height), 45)
+        if self.plate:
+            areas.append(("plate", rectangle(left, end, low, high)))
+            plate = Distance("plate", (end, self.height), (end, height))
         whole = View(
             "the network in the plane of x and z",
             areas,
             [
                 Pointer("columns", (right - 0.5 * self.cell_width, height), 90),
                 Pointer("rows", (0.0, 0.5 * (self.thickness + self.cell_height)), 180),
+                plate,
             ],
             notes={"tip-face": (middle, 1.06 * height), "mount": (middle, -0.06 * height)},
         )
@@ -160,6 +173,8 @@ class Honeycomb(Actuator):
     def _depth_view(self) -> View:
         half, inside, height = 0.5 * self.depth, 0.5 * self.depth - self.end_wall, self.height
         areas = [("body", rectangle(-half, half, 0.0, height))]
+        if self.plate:
+            areas.append(("plate", rectangle(-half, half, *self._plate_box()[2:])))
         for row in range(self.rows):
             low = row * self.cell_height + self.thickness
             areas.append((AIR, rectangle(-inside, inside, low, low + self.cell_height - self.thickness)))
@@ -171,16 +186,26 @@ class Honeycomb(Actuator):
 
     def draw(self) -> Shape:
         """Draw the network in its plane or swept along y, with the cells as holes or closed by end walls."""
+        occ = cad.occ()
         middle = (self.columns // 2 + 0.5) * self.cell_width
-        ends = np.array([[middle, 0.0, 0.0], [middle, 0.0, self.height]])
+        ends = np.array([[middle, 0.0, 0.0], [middle, 0.0, self.height + self.plate]])
         flat = self.model == "plane"
-        body = cad.with_points(self._section() if flat else self._solid(), ends, 2 if flat else 3)
+        dimension = 2 if flat else 3
+        body = [(dimension, self._section() if flat else self._solid())]
+        plate = [(dimension, self._plate())] if self.plate else []
+        if plate:
+            body, _ = occ.cut(body, plate, removeTool=False)
+        _, pieces = occ.fragment(body + plate, [(0, occ.addPoint(*end)) for end in ends])
+        occ.synchronize()
+        solids = [int(tag) for piece in pieces[: len(body + plate)] for _, tag in piece]
+        last = len(solids) - len(plate)
+        regions = {"body": solids[:last], "plate": solids[last:]}
         places = ends[:, [0, 2]] if flat else ends
         return Shape(
-            regions={"body": [body]},
-            surfaces=self._surfaces(body, 2 if flat else 3),
+            regions={name: parts for name, parts in regions.items() if parts},
+            surfaces=self._surfaces(solids, dimension),
             markers={"base": places[:1], "tip": places[1:]},
-            dimension=2 if flat else 3,
+            dimension=dimension,
         )
 
     def _contours(self) -> tuple[list[Piece], list[list[Piece]], list[list[Piece]]]:
@@ -212,11 +237,25 @@ class Honeycomb(Actuator):
         (body,), _ = occ.cut([(3, solid)], air)
         return int(body[1])
 
-    def _surfaces(self, body: int, dimension: int) -> dict[str, list[int]]:
-        faces = cad.boundary([body], dimension)
+    def _plate_box(self) -> tuple[float, float, float, float]:
+        """Return where the plate begins and ends along x and along z."""
+        first, last = self._cell(0, 0)[1][0], self._cell(self.columns - 1, 0)[2][0]
+        return first, last, self.height - 0.5 * self.thickness, self.height + self.plate
+
+    def _plate(self) -> int:
+        left, right, low, high = self._plate_box()
+        section = cad.plane_face(polygon([(left, low), (right, low), (right, high), (left, high)]))
+        if self.model == "plane":
+            return section
+        begin = 0.0 if self.model == "half" else -0.5 * self.depth
+        cad.occ().translate([(2, section)], 0, begin, 0)
+        return cad.sweep(section, (0, 0.5 * self.depth - begin, 0))
+
+    def _surfaces(self, solids: list[int], dimension: int) -> dict[str, list[int]]:
+        faces = cad.boundary(solids, dimension)
         symmetry = cad.faces_in_plane(faces, "y", 0.0) if self.model == "half" else []
         outside, *pockets = cad.skins([face for face in faces if face not in symmetry], dimension)
-        mount, tip = (cad.faces_in_plane(outside, "z", z, dimension) for z in (0.0, self.height))
+        mount, tip = (cad.faces_in_plane(outside, "z", z, dimension) for z in (0.0, self.height + self.plate))
         outer = [face for face in outside if face not in mount + tip]
         columns: dict[str, list[int]] = {f"cavity-{number + 1}": [] for number in range(self.columns)}
         for pocket in pockets:

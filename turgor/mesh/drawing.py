@@ -29,6 +29,7 @@ _FILLS = {
     "reinforcement": "#c78d6b",
     "outer-layer": "#aebbc9",
     "membrane": "#c9b79c",
+    "plate": "#aebbc9",
 }
 _FILL = "#cfd6dd"
 _ARROW = {"arrowstyle": "-|>,head_length=0.35,head_width=0.12", "color": _BLUE, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
