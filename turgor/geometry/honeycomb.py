@@ -31,8 +31,8 @@ class Honeycomb(Actuator):
 
     Regions ``body`` and ``plate``; surfaces ``mount`` (the flats at the bottom), ``tip-face`` (those on top, or the
     plate's top), ``cavity-1``, ``cavity-2``, … (all cells of the first, second, … column along x, which share one
-    pressure), ``outer`` and, of the half model, ``symmetry``; ``base`` and ``tip`` (middle of the middle column,
-    markers at the bottom and on top, y = 0).
+    pressure), ``outer`` and, of the half model, ``symmetry``; markers ``base`` and ``tip`` (middle of the middle
+    column at the bottom and on top, y = 0).
     """
 
     template: ClassVar[str] = "honeycomb"
