@@ -334,7 +334,15 @@ def test_a_standard_helix_is_one_curve_from_end_to_end():
     curves = tube._curves()
     assert list(curves) == ["fibre-1"]
     length = np.linalg.norm(np.diff(curves["fibre-1"], axis=0), axis=1).sum()
-    assert length == pytest.approx(305 / 15 * math.hypot(15, 2 * math.pi * 8.05), rel=0.005)
+    assert length == pytest.approx(305 / 15 * math.hypot(15, 2 * math.pi * 8.05), rel=0.0005)
+
+
+@pytest.mark.parametrize("tilt", ["0 deg", "41 deg", "61 deg"])
+@pytest.mark.parametrize("pitch", ["15 mm", "13.7 mm"])
+def test_fibres_end_in_the_planes_that_clip_them(tilt, pitch):
+    curves = actuator("fibre-tube", tilt=tilt, pitch=pitch, fibres=3, winding="both")._curves()
+    ends = np.array([curve[end, 2] for curve in curves.values() for end in (0, -1)])
+    np.testing.assert_allclose(np.minimum(np.abs(ends - 17.0), np.abs(ends - 322.0)), 0.0, atol=1e-11)
 
 
 def test_local_sizes_refine_where_they_are_named():

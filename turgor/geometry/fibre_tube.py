@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import ClassVar, Literal
 
 import numpy as np
+from scipy.optimize import brentq
 
 from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
@@ -172,10 +174,30 @@ class FibreTube(Actuator):
         first = math.floor((-amplitude - shift) / self.pitch)
         last = math.ceil((self.fibre_length + amplitude - shift) / self.pitch)
         turn = 2.0 * math.pi * np.linspace(first, last, (last - first) * _POINTS_PER_TURN + 1)
-        height = self.pitch * turn / (2.0 * math.pi) + amplitude * np.cos(turn) + shift
-        points = np.column_stack([radius * np.cos(turn), sense * radius * np.sin(turn), low + height])
-        inside = (height >= 0.0) & (height <= self.fibre_length)
-        changes = np.flatnonzero(np.diff(inside.astype(np.int8))) + 1
-        runs = [run for run in np.split(np.arange(len(turn)), changes) if inside[run[0]] and len(run) > 2]
-        runs.sort(key=len, reverse=True)
-        return [points[run] for run in runs]
+
+        def height(angle: FloatArray) -> FloatArray:
+            rise: FloatArray = self.pitch * angle / (2.0 * math.pi) + amplitude * np.cos(angle) + shift
+            return rise
+
+        parts = [part for part in _spans(turn, height, self.fibre_length) if len(part) > 2]
+        parts.sort(key=len, reverse=True)
+        return [
+            np.column_stack([radius * np.cos(part), sense * radius * np.sin(part), low + height(part)])
+            for part in parts
+        ]
+
+
+def _spans(turn: FloatArray, height: Callable[[FloatArray], FloatArray], length: float) -> list[FloatArray]:
+    """Return the parts of `turn` with 0 ≤ height ≤ `length`, each with the angles at which it leaves that range."""
+    ends = []
+    for level in (0.0, length):
+        above = height(turn) > level
+        for index in np.flatnonzero(above[1:] != above[:-1]):
+            bracket = turn[index], turn[index + 1]
+            ends.append(brentq(lambda angle, level=level: height(angle) - level, *bracket, xtol=1e-14))
+    angles = np.unique(np.append(turn, ends))
+    # An end that rounding parts from a point of the helix would leave a segment without a direction.
+    angles = angles[np.diff(angles, prepend=-np.inf) > 1e-9]
+    inside = np.abs(height(0.5 * (angles[:-1] + angles[1:])) - 0.5 * length) < 0.5 * length
+    changes = np.flatnonzero(np.diff(inside, prepend=False, append=False))
+    return [angles[start : end + 1] for start, end in zip(changes[::2], changes[1::2], strict=True)]
