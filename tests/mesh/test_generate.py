@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError, MissingPackageError
+from turgor.geometry.bellows import Bellows
 from turgor.geometry.pneunet import PneuNet
 from turgor.geometry.tube import CappedTube
 from turgor.mesh.faces import boundary_faces, rim_edges
@@ -254,3 +255,18 @@ def test_nodes_on_a_polyline_come_in_its_order():
     np.testing.assert_array_equal(places, [[1, 0, 0], [0.5, 0, 0], [0, 0, 0], [0, 0, 0.5], [0, 0, 1]])
     with pytest.raises(InputError, match="edge: no node"):
         nodes_on_polyline(points, np.array([[0.3, 0.3, 0.3]]), "edge")
+
+
+@pytest.mark.parametrize("count", [16, 32, 64])
+def test_round_edges_get_elements_by_their_radius(count):
+    bellows = Bellows(model="axisymmetric", convolutions=1)
+    mesh = generate(bellows, 1.6, per_circle=count)
+    radius = bellows.rounding + bellows.wall / 2
+    centre = next(piece.centre for piece in bellows._line(0.0)[2:] if piece.centre is not None)
+    on_crest = np.abs(np.hypot(*(mesh.points - centre).T) - radius) < 1e-6
+    edges = mesh.surfaces["outer"]
+    edges = edges[on_crest[edges].all(axis=1)]
+    lengths = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1)
+    wanted = 2 * math.pi * radius / count
+    assert lengths.max() <= wanted
+    assert lengths.min() > 0.9 * wanted
