@@ -1,11 +1,14 @@
+from functools import partial
+
 import matplotlib.image
 import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.named_parts import save_named_parts
 from turgor.mesh.picture import save_picture
-from turgor.mesh.structured import box
+from turgor.mesh.structured import box, rectangle
 
 
 @pytest.fixture
@@ -24,6 +27,17 @@ def test_the_picture_shows_the_body(block, show, tmp_path):
     assert pixels.shape[:2] == (900, 1400)
     drawn = (pixels[..., :3] < 0.98).any(axis=-1)
     assert 0.05 < drawn.mean() < 0.9
+
+
+@pytest.mark.parametrize("show", ["names", "quality"])
+@pytest.mark.parametrize("kind", ["tri6", "quad9", "hex27"])
+def test_every_kind_of_cell_is_drawn(kind, show, tmp_path):
+    mesh = box((3.0, 1.0, 1.0), (3, 1, 1), kind) if kind == "hex27" else rectangle((3.0, 1.0), (3, 1), kind)
+    for number, save in enumerate((lambda path: save_picture(mesh, path, show=show), partial(save_named_parts, mesh))):
+        path = tmp_path / f"{number}.png"
+        save(path)
+        drawn = (matplotlib.image.imread(path)[..., :3] < 0.98).any(axis=-1)
+        assert 0.05 < drawn.mean() < 0.95
 
 
 def test_only_png(block, tmp_path):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from turgor.common.optional import require
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.picture import PICTURE_EDGES, colour_of, drawing, skin_of
+from turgor.mesh.picture import LINES, PICTURE_EDGES, colour_of, drawing, look, skin_of
 from turgor.mesh.tet10 import FloatArray, IntArray
 
 _ABOVE, _BELOW = (0.6, -1.0, 0.5), (-0.6, 1.0, -0.5)
@@ -20,6 +20,8 @@ _REGIONS = ("#b9c4d0", "#c8553d", "#5b9bd5", "#d9b44a", "#117733", "#aa4499", "#
 
 def save_named_parts(mesh: Mesh, path: str | Path, *, panel: tuple[int, int] = (700, 700)) -> None:
     """Draw a mesh in space three times: its surfaces from above, from below, and its regions cut open along y.
+
+    A plane mesh is drawn twice from the front, its surfaces as lines.
 
     Every surface has a colour of its own; the rims under caps and the markers are drawn and named.
 
@@ -39,16 +41,19 @@ def save_named_parts(mesh: Mesh, path: str | Path, *, panel: tuple[int, int] = (
     MissingPackageError
         If pyvista or a system library that it loads is absent.
     """
-    with drawing(path, shape=(1, 3), window_size=(3 * panel[0], panel[1])) as plotter:
-        for number, (title, view) in enumerate((("from above", _ABOVE), ("from below", _BELOW))):
+    flat = mesh.dimension == 2
+    views = [("edges", _ABOVE)] if flat else [("from above", _ABOVE), ("from below", _BELOW)]
+    count = len(views) + 1
+    with drawing(path, shape=(1, count), window_size=(count * panel[0], panel[1])) as plotter:
+        for number, (title, view) in enumerate(views):
             _begin(plotter, number, title)
             _add_surfaces(plotter, mesh)
             _add_caps(plotter, mesh)
-            _look(plotter, view)
-        _begin(plotter, 2, "regions, cut open")
+            _look(plotter, mesh, view)
+        _begin(plotter, count - 1, "regions" if flat else "regions, cut open")
         _add_regions(plotter, mesh)
         _add_caps(plotter, mesh)
-        _look(plotter, _ABOVE)
+        _look(plotter, mesh, _ABOVE)
 
 
 def save_fault(
@@ -83,16 +88,17 @@ def _surface_colours(mesh: Mesh) -> dict[str, str]:
     return {name: colour_of(name) or next(own) for name in mesh.surfaces}
 
 
-def _look(plotter: Any, view: tuple[float, float, float]) -> None:
+def _look(plotter: Any, mesh: Mesh, view: tuple[float, float, float]) -> None:
     plotter.add_legend(bcolor="white", size=(0.26, 0.2), loc="lower right", face="rectangle")
-    plotter.view_vector(view, (0, 0, 1))
+    look(plotter, mesh, view)
 
 
 def _add_surfaces(plotter: Any, mesh: Mesh) -> None:
     pyvista, colours = require("pyvista"), _surface_colours(mesh)
+    look_of = PICTURE_EDGES if mesh.dimension == 3 else LINES
     for name, faces in mesh.surfaces.items():
         if len(faces):
-            plotter.add_mesh(skin_of(pyvista, mesh, faces), color=colours[name], label=name, **PICTURE_EDGES)
+            plotter.add_mesh(skin_of(pyvista, mesh, faces), color=colours[name], label=name, **look_of)
 
 
 def _add_caps(plotter: Any, mesh: Mesh) -> None:
@@ -105,10 +111,11 @@ def _add_caps(plotter: Any, mesh: Mesh) -> None:
 
 
 def _add_regions(plotter: Any, mesh: Mesh) -> None:
-    centres = mesh.points[mesh.cells[:, :4]].mean(axis=1)
-    behind = centres[:, 1] >= np.median(mesh.points[:, 1])
+    flat = mesh.dimension == 2
+    centres = mesh.points[mesh.cells].mean(axis=1)
+    behind = flat | (centres[:, 1] >= np.median(mesh.points[:, 1]))
     for number, (name, cells) in enumerate(mesh.regions.items()):
         kept: IntArray = mesh.cells[cells[behind[cells]]]
         if len(kept):
-            skin, colour = skin_of(require("pyvista"), mesh, boundary_faces(kept)), _REGIONS[number % len(_REGIONS)]
-            plotter.add_mesh(skin, color=colour, label=name, **PICTURE_EDGES)
+            skin = skin_of(require("pyvista"), mesh, kept if flat else boundary_faces(kept))
+            plotter.add_mesh(skin, color=_REGIONS[number % len(_REGIONS)], label=name, **PICTURE_EDGES)

@@ -14,7 +14,7 @@ from turgor.common.optional import require
 from turgor.mesh.faces import boundary_faces, host_cells
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.quality import quality
-from turgor.mesh.tet10 import IntArray
+from turgor.mesh.tet10 import FloatArray, IntArray
 
 COLOURS = {
     "mount": "#444444",
@@ -25,8 +25,11 @@ COLOURS = {
 }
 """Colour of a surface by the beginning of its name; others are grey."""
 
-_VTK_QUADRATIC_TRIANGLE = 22
+_VTK_TYPES = {3: 21, 6: 22, 9: 28}
+"""VTK's number of the curved edge, triangle and quadrilateral with so many nodes."""
+
 PICTURE_EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity": 0.25}
+LINES: dict[str, Any] = {"line_width": 5}
 
 
 def save_picture(
@@ -66,46 +69,79 @@ def save_picture(
 
 def _draw(plotter: Any, mesh: Mesh, show: str, cut: bool) -> None:
     pyvista = require("pyvista")
-    middle = mesh.points[:, 1].min() if not cut else float(mesh.points[:, 1].mean())
-    surfaces = dict(mesh.surfaces) if show == "names" else {"skin": boundary_faces(mesh.cells)}
+    if show == "quality":
+        _draw_quality(pyvista, plotter, mesh, cut)
+    else:
+        _draw_names(pyvista, plotter, mesh, cut)
+    look(plotter, mesh, (0.5, -1.0, 0.45))
+    extent = np.ptp(mesh.points, axis=0)
+    # A tall body fills the height already.
+    plotter.camera.zoom(1.3 if mesh.dimension == 3 and extent[2] < extent.max() else 1.0)
+
+
+def _draw_quality(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
     measured = quality(mesh)
-    for name, triangles in surfaces.items():
-        kept = triangles[mesh.points[triangles].mean(axis=1)[:, 1] >= middle]
-        if len(kept) == 0:
-            continue
-        skin = skin_of(pyvista, mesh, kept)
-        if show == "quality":
-            skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[host_cells(mesh.cells, kept)]
-            plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **PICTURE_EDGES)
-        else:
+    seen = mesh.cells if mesh.dimension == 2 else _beyond(mesh, boundary_faces(mesh.cells), cut)
+    hosts = np.arange(mesh.n_cells) if mesh.dimension == 2 else host_cells(mesh.cells, seen)
+    skin = skin_of(pyvista, mesh, seen)
+    skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[hosts]
+    plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **PICTURE_EDGES)
+    worst = in_space(measured.centres[measured.worst_cell][None])
+    plotter.add_point_labels(worst, [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
+
+
+def _draw_names(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
+    if mesh.dimension == 2:
+        plotter.add_mesh(skin_of(pyvista, mesh, mesh.cells), color="#e8eaed", **PICTURE_EDGES)
+    for name, faces in mesh.surfaces.items():
+        kept = _beyond(mesh, faces, cut)
+        if len(kept):
             # Fibres run inside the wall; they show through the outside.
             opacity = 0.3 if mesh.curves and name == "outer" else 1.0
-            plotter.add_mesh(skin, color=colour_of(name) or "#aaaaaa", label=name, opacity=opacity, **PICTURE_EDGES)
-    if show == "quality":
-        worst = measured.centres[measured.worst_cell]
-        plotter.add_point_labels([worst], [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
+            look_of = PICTURE_EDGES if mesh.dimension == 3 else LINES
+            plotter.add_mesh(
+                skin_of(pyvista, mesh, kept), color=colour_of(name) or "#aaaaaa", label=name, opacity=opacity, **look_of
+            )
+    _add_lines(pyvista, plotter, mesh)
+    plotter.add_legend(bcolor="white", size=(0.16, 0.2))
+
+
+def _beyond(mesh: Mesh, faces: IntArray, cut: bool) -> IntArray:
+    """Return the faces beyond the middle of y, or all of them."""
+    kept: IntArray = faces[mesh.points[faces].mean(axis=1)[:, 1] >= mesh.points[:, 1].mean()] if cut else faces
+    return kept
+
+
+def look(plotter: Any, mesh: Mesh, view: tuple[float, float, float]) -> None:
+    """Look at a body from `view`, at a section from the front."""
+    if mesh.dimension == 2:
+        plotter.view_xy()
     else:
-        _add_lines(pyvista, plotter, mesh)
-        plotter.add_legend(bcolor="white", size=(0.16, 0.2))
-    plotter.view_vector((0.5, -1.0, 0.45), (0, 0, 1))
-    extent = np.ptp(mesh.points, axis=0)
-    plotter.camera.zoom(1.3 if extent[2] < extent.max() else 1.0)  # a tall body fills the height already
+        plotter.view_vector(view, (0, 0, 1))
 
 
-def skin_of(pyvista: Any, mesh: Mesh, triangles: IntArray) -> Any:
-    """Return six-node triangles of a mesh as a grid to draw."""
-    cells = np.hstack([np.full((len(triangles), 1), 6), triangles]).ravel()
-    return pyvista.UnstructuredGrid(cells, np.full(len(triangles), _VTK_QUADRATIC_TRIANGLE), mesh.points)
+def skin_of(pyvista: Any, mesh: Mesh, faces: IntArray) -> Any:
+    """Return curved faces of a mesh, or edges or cells of a plane one, as a grid to draw."""
+    n = faces.shape[1]
+    cells = np.hstack([np.full((len(faces), 1), n), faces]).ravel()
+    return pyvista.UnstructuredGrid(cells, np.full(len(faces), _VTK_TYPES[n]), in_space(mesh.points))
+
+
+def in_space(points: FloatArray) -> FloatArray:
+    """Return points ``(k, 3)``, those of a plane mesh with z = 0."""
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 
 def _add_lines(pyvista: Any, plotter: Any, mesh: Mesh) -> None:
     for curve in mesh.curves.values():
-        plotter.add_mesh(pyvista.lines_from_points(curve), color="#8b1a1a", line_width=3)
+        plotter.add_mesh(pyvista.lines_from_points(in_space(curve)), color="#8b1a1a", line_width=3)
     for name, nodes in mesh.markers.items():
         size = 6 if len(nodes) > 1 else 16
-        plotter.add_points(mesh.points[nodes], color="#117733", point_size=size, render_points_as_spheres=True)
+        plotter.add_points(
+            in_space(mesh.points[nodes]), color="#117733", point_size=size, render_points_as_spheres=True
+        )
         if len(nodes) == 1:
-            plotter.add_point_labels(mesh.points[nodes], [name], always_visible=True, shape_opacity=0.6)
+            plotter.add_point_labels(in_space(mesh.points[nodes]), [name], always_visible=True, shape_opacity=0.6)
 
 
 def colour_of(name: str) -> str | None:
