@@ -69,20 +69,22 @@ def test_volumes_are_hit_and_the_run_goes_on_where_it_was_cut(small_tube: Path) 
     # the curve of pressure over volume is the first one in the report, and falls
     curve = plots.load_motion(stored.history).data[0]
     assert list(curve.y) == pytest.approx(list(pressure))
-    for file in ("0001", "0002"):
-        for end in ("npz", "vtu"):
-            (done.folder / "steps" / f"{file}.{end}").unlink()
+    # cut just behind the limit, it goes on without storing the limit once more
+    for end in ("npz", "vtu"):
+        (done.folder / "steps" / f"0002.{end}").unlink()
     again = run(load_case(small_tube, changes), done.folder, resume=True)
+    assert [row["event"] for row in RunStore.open(done.folder).history] == ["", "limit-pressure", ""]
     assert again.summary["final"]["pressure_kPa"] == pytest.approx(pressure[2], rel=1e-6)
     assert [e["event"] for e in again.summary["events"]] == ["limit-pressure"]
 
 
 def test_air_obeys_boyle(small_tube: Path) -> None:
-    done, rows = ran(small_tube, FREE, "control={type: air, target: 300 %}", "solver.steps=2")
+    done, rows = ran(small_tube, FREE, "control={type: air, target: 200 %}", "solver.steps=1")
     amount = (column(rows, "pressure_kPa") + SURROUNDINGS) * column(rows, "cavity_volume_mm3")
-    assert amount / (SURROUNDINGS * rest_volume(done)) == pytest.approx([2.0, 3.0], rel=1e-5)
+    assert amount / (SURROUNDINGS * rest_volume(done)) == pytest.approx([2.0], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_arc_length_meets_the_same_limit(small_tube: Path) -> None:
     done, rows = ran(small_tube, "control={type: arc-length, target: 400 %}", "solver.steps=1")
     assert rows[-1]["fraction"] == "1.0"
@@ -105,6 +107,16 @@ def test_a_programme_goes_up_and_down(small_tube: Path) -> None:
     again = load_case(done.folder / "case.yaml")
     assert again.pressures[0].programme == load_case(done.folder / "case.yaml").pressures[0].programme
     assert again.duration == 4.0
+
+
+@pytest.mark.slow
+def test_a_run_that_stopped_at_a_limit_stops_there_again(small_tube: Path) -> None:
+    changes = ["loads.0.value=36 kPa", "solver={outputs: [30 kPa, 36 kPa]}"]
+    done, rows = ran(small_tube, *changes)
+    assert [row["event"] for row in rows] == ["", "limit-pressure"]
+    again = run(load_case(small_tube, changes), done.folder, resume=True)
+    assert (again.summary["outcome"], again.summary["reason"]) == ("limit-pressure", done.summary["reason"])
+    assert RunStore.open(done.folder).n_steps == 2
 
 
 @pytest.mark.parametrize(

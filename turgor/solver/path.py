@@ -161,7 +161,7 @@ class _Walk:
         self.before: Equilibrium | None = None
         self.step = options.largest_step
         self._tally = Tally()
-        self._delivered: Equilibrium | None = None
+        self._delivered = start
         self._failures = 0
 
     def deliver(self) -> None:

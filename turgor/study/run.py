@@ -230,14 +230,25 @@ class _Running:
 
     def _walk(self, system: System, course: Course, store: RunStore) -> SolverError | None:
         """Follow the path; return what stopped it short, or ``None`` if it reached the end."""
-        last = store.last()
-        start = to_equilibrium(system, last) if last else None
+        last, known = store.last(), None
         if last and last.fraction >= 1.0:
             return None
+        if last and last.solver["event"] in (Event.LIMIT, Event.MINIMUM):
+            # The path cannot be taken up at a limit, where it has no direction: from before, the limit is met again.
+            known, last = last.solver["event"], store.load(last.index - 1) if last.index else None
+        start = to_equilibrium(system, last) if last else None
         self.show.stage("load")
         recorder = Recorder(system, store.n_steps, course)
+
+        def keep(equilibrium: Equilibrium) -> None:
+            nonlocal known
+            if known is not None and equilibrium.event == known:
+                known = None  # in the store already
+            else:
+                self._keep(recorder, store, equilibrium)
+
         try:
-            course.walk(start, lambda equilibrium: self._keep(recorder, store, equilibrium), self._tell)
+            course.walk(start, keep, self._tell)
         except SolverError as error:
             log.error("%s %s", error, error.facts)
             return error
