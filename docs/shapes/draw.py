@@ -18,8 +18,19 @@ PICTURES = {
 }
 """Template → parameters, element size in mm, whether to look inside."""
 
+SECTIONS = {
+    "tube": ({"model": "axisymmetric", "length": "60 mm"}, 2.0),
+    "bellows": ({"model": "axisymmetric"}, 0.8),
+    "membrane": ({"model": "plane", "segments": 3}, 0.8),
+    "honeycomb": ({"model": "plane", "columns": 2, "rows": 2, "plate": "3 mm"}, 1.0),
+}
+"""Template → parameters of the model that is drawn in the plane, element size in mm."""
+
 if __name__ == "__main__":
     for name, (parameters, size, cut) in PICTURES.items():
         save_drawing(actuator(name), Path(__file__).parent / f"{name}-drawing.png")
         mesh = generate(actuator(name, **parameters), size)
         save_picture(mesh, Path(__file__).parent / f"{name}.png", cut=cut, window=(900, 580))
+    for name, (parameters, size) in SECTIONS.items():
+        section = generate(actuator(name, **parameters), size)
+        save_picture(section, Path(__file__).parent / f"{name}-section.png", window=(900, 580))

@@ -89,9 +89,6 @@ class Actuator(BaseModel, ABC):
     template: ClassVar[str]
     """The name by which case files and commands call the template."""
 
-    per_circle: ClassVar[int] = 12
-    """Elements along a full circle by default: longer ones would bulge through a thin wall when they are curved."""
-
     def __init__(self, **parameters: Any) -> None:
         try:
             super().__init__(**parameters)
@@ -117,6 +114,11 @@ class Actuator(BaseModel, ABC):
             if is_length and size != 0.0 and not SMALLEST <= size <= LARGEST:
                 expected = f"{SMALLEST:g} mm to {LARGEST:g} mm"
                 raise InputError("no actuator has this size", key=name, value=f"{size:g} mm", expected=expected)
+
+    @property
+    def per_circle(self) -> int:
+        """Elements along a full circle by default: longer ones would bulge through a thin wall when they are curved."""
+        return 12
 
     @property
     def section(self) -> PlaneSection | None:

@@ -6,6 +6,7 @@ import math
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from typing_extensions import override
 
 from turgor.common.errors import InputError
 from turgor.common.units import Angle, PositiveLength
@@ -33,8 +34,6 @@ class Bellows(Actuator):
     """
 
     template: ClassVar[str] = "bellows"
-    # The edges' tight arcs are cut across a wall nearly as thick as their radius: shorter elements gain little.
-    per_circle: ClassVar[int] = 8
 
     convolutions: int = parameter(3, "number of outward folds", _ASSUMED, ge=1, le=30)
     crest_radius: PositiveLength = parameter("15.73 mm", "outside of the wall at a crest", f"{_ANNEX}: half of C")
@@ -49,6 +48,12 @@ class Bellows(Actuator):
     model: Literal["full", "half", "quarter", "axisymmetric"] = parameter(
         "full", "the whole, the half y ≥ 0, the quarter x, y ≥ 0, or the section of radius and height", _ASSUMED
     )
+
+    @property
+    @override
+    def per_circle(self) -> int:
+        # The edges' tight arcs are cut across a wall nearly as thick as their radius: shorter elements gain little.
+        return 8
 
     @property
     def section(self) -> PlaneSection | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
+from typing_extensions import override
 
 from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
@@ -36,8 +37,6 @@ class Honeycomb(Actuator):
     """
 
     template: ClassVar[str] = "honeycomb"
-    # Roundings of a millimetre along metres of corners: finer arcs would cost ten times the elements.
-    per_circle: ClassVar[int] = 3
 
     columns: int = parameter(3, "number of cells along x", _PAPER, ge=1, le=20)
     rows: int = parameter(3, "number of cells along z", _PAPER, ge=1, le=20)
@@ -60,6 +59,13 @@ class Honeycomb(Actuator):
         "the whole, the half y ≥ 0 with the surface 'symmetry', or the section in the plane of x and z",
         _ASSUMED,
     )
+
+    @property
+    @override
+    def per_circle(self) -> int:
+        # Roundings of a millimetre along metres of corners: finer arcs would cost ten times the elements. Those larger
+        # than the walls are thick are seen in the volumes.
+        return 3 if self.rounding <= self.thickness else 6
 
     @property
     def section(self) -> PlaneSection | None:
