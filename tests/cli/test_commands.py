@@ -222,7 +222,7 @@ def test_the_schema_is_one_of_case_files() -> None:
 def test_doctor_tells_what_it_stands_on(monkeypatch: pytest.MonkeyPatch) -> None:
     found = printed("doctor", "--json")
     assert found["versions"]["turgor"] == tg.__version__
-    assert found["linear_solver"] in {"MKL PARDISO", "SuperLU"}
+    assert found["linear_solver"] in {"MKL PARDISO", "MUMPS", "SuperLU"}
     assert found["threads"]["kernels"] >= 1
     assert found["missing"] == []
     assert "linear_solver" in turgor("doctor").stdout

@@ -14,7 +14,6 @@ OPTIONAL: dict[str, str] = {
     "vtk": "pictures of the deformed body",
     "pyvista": "pictures of the deformed body",
     "gmsh": "meshing",
-    "mumps": "the factorisation where MKL is absent",
     "ipctk": "the check that no surfaces intersect",
 }
 """Package name and what needs it."""

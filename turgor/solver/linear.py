@@ -235,7 +235,8 @@ class Mumps(LinearSolver):
         """Begin anew with another pattern."""
         super().take(row_start, column)
         self._row = np.repeat(np.arange(self.n, dtype=np.int32), np.diff(row_start))
-        self._context: Any = require("mumps").Context()
+        self._mumps: Any = require("mumps", "the factorisation without MKL")
+        self._context = self._mumps.Context()
 
     def factorise(self, values: Floats) -> None:
         """Factorise; the first call also orders and analyses the pattern."""
@@ -243,7 +244,7 @@ class Mumps(LinearSolver):
         self._context.set_matrix(upper, symmetric=True)
         try:
             self._context.factor(reuse_analysis=self._context.analyzed)
-        except require("mumps").MUMPSError as error:
+        except self._mumps.MUMPSError as error:
             raise SingularMatrixError(f"the stiffness matrix could not be factorised ({error})") from error
 
     def solve(self, right: Floats) -> Floats:
