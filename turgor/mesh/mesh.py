@@ -257,3 +257,9 @@ def _named(things: Mapping[str, npt.NDArray[Scalar]], name: str, kind: str) -> n
         available = ", ".join(sorted(things)) or f"no {kind} at all"
         raise InputError(f"the mesh has no {kind} of this name", value=name, expected=f"one of: {available}")
     return things[name]
+
+
+def in_space(vectors: FloatArray) -> FloatArray:
+    """Return vectors or places ``(..., d)`` with three components, the third of a plane model 0."""
+    missing = 3 - vectors.shape[-1]
+    return np.concatenate([vectors, np.zeros((*vectors.shape[:-1], missing))], axis=-1) if missing else vectors

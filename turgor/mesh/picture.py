@@ -12,9 +12,9 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.optional import require
 from turgor.mesh.faces import boundary_faces, host_cells
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 from turgor.mesh.quality import quality
-from turgor.mesh.tet10 import FloatArray, IntArray
+from turgor.mesh.tet10 import IntArray
 
 COLOURS = {
     "mount": "#444444",
@@ -125,11 +125,6 @@ def skin_of(pyvista: Any, mesh: Mesh, faces: IntArray) -> Any:
     n = faces.shape[1]
     cells = np.hstack([np.full((len(faces), 1), n), faces]).ravel()
     return pyvista.UnstructuredGrid(cells, np.full(len(faces), _VTK_TYPES[n]), in_space(mesh.points))
-
-
-def in_space(points: FloatArray) -> FloatArray:
-    """Return points ``(k, 3)``, those of a plane mesh with z = 0."""
-    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 
 def _add_lines(pyvista: Any, plotter: Any, mesh: Mesh) -> None:

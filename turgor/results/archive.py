@@ -15,10 +15,9 @@ import numpy.typing as npt
 
 from turgor.common.errors import InputError
 from turgor.mesh.files import meshio_name
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.files import replacing
 from turgor.results.record import ARRAY_FIELDS, PLAIN_FIELDS, StepRecord
-from turgor.results.stored import in_space
 
 Row = dict[str, Any]
 """One row of ``history.csv``: column → number, truth value or ``None``."""

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.mesh.faces import boundary_faces
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 from turgor.mesh.tet10 import IntArray
 from turgor.results.camera import AZIMUTH
 from turgor.results.skin import compact, outside_faces, six_node_triangles
-from turgor.results.stored import Body, in_space
+from turgor.results.stored import Body
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -17,8 +17,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from turgor.mesh.mesh import Mesh
-from turgor.results.stored import in_space
+from turgor.mesh.mesh import Mesh, in_space
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -103,9 +103,3 @@ class StoredState:
     def positions(self) -> FloatArray:
         """Where the nodes are now, ``(n, d)``, mm."""
         return np.asarray(self.mesh.points + self.record.displacement)
-
-
-def in_space(vectors: FloatArray) -> FloatArray:
-    """Return vectors or places ``(..., d)`` with three components, the third of a plane model 0."""
-    missing = 3 - vectors.shape[-1]
-    return np.concatenate([vectors, np.zeros((*vectors.shape[:-1], missing))], axis=-1) if missing else vectors

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -278,8 +278,3 @@ def _ended(walk: VolumeWalk, post: _Post) -> StoppedShortError:
     if walk.here is not post.last:
         post.send(walk.here)
     return stopped(walk.system, walk.here, walk.failure or NotConvergedError("the path turns back"))
-
-
-def steps_between(first: float, last: float, count: int) -> Iterator[float]:
-    """Yield `count` equal steps from `first`, not itself, to exactly `last`."""
-    yield from (float(x) for x in np.linspace(first, last, count + 1)[1:])

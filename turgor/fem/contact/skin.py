@@ -16,7 +16,7 @@ from turgor.fem.section import Section, depth
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.cells import CELLS, Cell, Rule, face_areas, face_cell, jacobians
 from turgor.mesh.faces import boundary_faces, host_cells
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -87,7 +87,7 @@ class Skin:
     ) -> None:
         self._cell = cell = _contact_cell(faces)
         self.dimension = mesh.dimension
-        self.points = _in_space(mesh.points)
+        self.points = np.array(in_space(mesh.points), order="C")
         self.faces = np.ascontiguousarray(faces, dtype=np.int32)
         self.rule = np.ascontiguousarray(np.pad(cell.points, ((0, 0), (0, 2 - cell.dimension))))
         self.shape = cell.shape_at_quadrature
@@ -175,10 +175,6 @@ def _measures(nodes: Floats, cell: Cell) -> Floats:
     if cell.dimension == 1:
         return np.asarray(np.linalg.norm(tangents[..., 0], axis=2))
     return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=2))
-
-
-def _in_space(points: Floats) -> Floats:
-    return np.ascontiguousarray(np.pad(points, ((0, 0), (0, 3 - points.shape[1]))))
 
 
 def _parts(mesh: Mesh) -> Ints:

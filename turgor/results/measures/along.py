@@ -12,11 +12,11 @@ from pydantic import Field
 from scipy.interpolate import make_lsq_spline
 
 from turgor.common.errors import InputError
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.material_line import along_marker, between_opposite, section_centroids
 from turgor.results.measures.registry import curve, measure
 from turgor.results.sections import MOUNT, TIP_FACE
-from turgor.results.stored import StoredState, in_space
+from turgor.results.stored import StoredState
 
 FloatArray = npt.NDArray[np.float64]
 

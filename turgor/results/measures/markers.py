@@ -14,12 +14,12 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength, from_internal
 from turgor.geometry.space import Place
-from turgor.mesh.mesh import Mesh
+from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.material_line import at_points
 from turgor.results.measured import MeasuredPositions, read_positions
 from turgor.results.measures.registry import measure
 from turgor.results.sections import MOUNT, TIP_FACE
-from turgor.results.stored import StoredState, in_space
+from turgor.results.stored import StoredState
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.common.errors import InputError
+from turgor.mesh.mesh import in_space
 from turgor.results.measures.registry import measure
 from turgor.results.sections import MOUNT, TIP_FACE, motion, seen_from_mount
-from turgor.results.stored import StoredState, in_space
+from turgor.results.stored import StoredState
 
 FloatArray = npt.NDArray[np.float64]
 
