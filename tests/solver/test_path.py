@@ -144,6 +144,16 @@ def test_a_stretched_bar_follows_the_closed_form():
     assert pull == pytest.approx(0.1 * (2.0 - 0.25), rel=2e-4)
 
 
+def test_a_load_on_what_is_stretched_is_no_jump():
+    # The stretch moves the force along, which says nothing about what gives way to the force.
+    supports = [*PLANES, Prescribed("z1", (None, None, 0.4))]
+    system = System(
+        box((2.0, 3.0, 4.0), (2, 2, 2)), {"body": neo_hookean(0.5, 20.0)}, supports, [Force("y1", (0.0, 0.1, 0.0))]
+    )
+    whole, parts = (solve_path(system, output_fractions(steps))[-1].state.u for steps in (1, 4))
+    np.testing.assert_allclose(whole, parts, atol=1e-7)
+
+
 def test_dead_traction_reaches_the_same_stretch():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
     system = System(mesh, {"body": neo_hookean()}, PLANES, [Traction("x1", (0.175, 0.0, 0.0))])

@@ -228,11 +228,14 @@ class _Walk:
     def _may_have_jumped(self, found: Equilibrium) -> bool:
         """Whether a step may have passed over a limit, to a branch behind it.
 
-        The load is a smooth function of its conjugate, also through limits. The cubic with the values and slopes
+        The load is a smooth function of its conjugate, also through limits, where nothing else grows with it, such as
+        given displacements, which move the conjugate by themselves. The cubic with the values and slopes
         (inverse compliances) of both ends rises all the way if the slopes, in parts of the mean one, lie in a circle of
         radius three (Fritsch and Carlson 1980). It is asked for only where the conjugate has changed much.
         """
         system, linear, here = self.system, self.linear, self.here
+        if system.constraints.moves:
+            return False
         growth = system.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
         if abs(after - before) <= LARGE_CHANGE * abs(before):
