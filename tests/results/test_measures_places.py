@@ -107,6 +107,20 @@ def test_the_force_on_a_rigid_body_is_its_size() -> None:
         check([Choice.read("tip-force")], FINGER)
 
 
+def test_the_reaction_at_a_support_turns_about_the_point_that_is_named() -> None:
+    body = Body(FINGER.mesh, supports=("mount", "symmetry"))
+    facts = {"force_N": [0.0, 3.0, -4.0], "torque_N_mm": [1.0, 0.0, 0.0], "about_mm": [0.0, 0.0, 2.0]}
+    state = moved(body, np.zeros_like(FINGER.mesh.points), standing={"supports": {"mount": facts}})
+    found = one(state, "reaction", surface="mount")
+    assert [found[f"reaction_mount_{key}N"] for key in ("x_", "y_", "z_", "")] == [0.0, 3.0, -4.0, 5.0]
+    assert [found[f"reaction_mount_torque_{axis}_N_mm"] for axis in "xyz"] == [1.0, 0.0, 0.0]
+    # T = (0 0 2 − 10 0 0) × (0 3 −4) + (1 0 0)
+    moment = one(state, "reaction", surface="mount", about=["10 mm", "0 mm", "0 mm"], name="foot")
+    assert [moment[f"reaction_mount_foot_torque_{axis}_N_mm"] for axis in "xyz"] == [-5.0, -40.0, -30.0]
+    with pytest.raises(InputError, match=r"no support holds this surface .*expected one of: mount, symmetry"):
+        check([Choice.read({"reaction": {"surface": "outer"}})], body)
+
+
 MARKERS = [["20 mm", "6 mm", "0 mm"], ["60 mm", "6 mm", "0 mm"], ["100 mm", "6 mm", "0 mm"]]
 
 

@@ -16,6 +16,9 @@ from turgor.mesh.mesh import Mesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+Condition = tuple[Floats, float, str]
+"""Unit direction ``(d,)``, displacement along it at load fraction one, mm, and the surface whose support says so."""
+
 SAME_DIRECTION = 1e-6
 """Sine of the angle below which two constrained directions at a node count as one."""
 
@@ -79,12 +82,7 @@ def compile_constraints(
     InputError
         If two supports prescribe different displacements of one node in one direction, or one leaves the plane.
     """
-    rows: dict[int, list[tuple[Floats, float, str]]] = {}
-    for support in supports:
-        for node, direction, value in _conditions(mesh, support):
-            rows.setdefault(node, []).append((direction, value, support.surface))
-    for node in on_axis(mesh, section):
-        rows.setdefault(int(node), []).append((np.array([1.0, 0.0]), 0.0, "axis"))
+    rows = conditions_at_nodes(mesh, supports, section)
     fixed = np.zeros(mesh.points.shape, bool)
     values = np.zeros(mesh.points.shape)
     nodes, frames = [], []
@@ -102,6 +100,25 @@ def compile_constraints(
     return Constraints(
         fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, mesh.dimension, mesh.dimension)
     )
+
+
+def conditions_at_nodes(
+    mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed], section: Section | None = None
+) -> dict[int, list[Condition]]:
+    """Return what holds each held node, in the order of the supports; last of all the axis of revolution.
+
+    Raises
+    ------
+    InputError
+        If a displacement leaves the plane.
+    """
+    rows: dict[int, list[Condition]] = {}
+    for support in supports:
+        for node, direction, value in _conditions(mesh, support):
+            rows.setdefault(node, []).append((direction, value, support.surface))
+    for node in on_axis(mesh, section):
+        rows.setdefault(int(node), []).append((np.array([1.0, 0.0]), 0.0, "axis"))
+    return rows
 
 
 def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[int, Floats, float]]:
@@ -142,7 +159,7 @@ def _node_normals(points: Floats, faces: Ints) -> Iterable[tuple[int, Floats]]:
             yield node, np.where(np.abs(unit) < 1e-9, 0.0, unit)
 
 
-def _independent(conditions: list[tuple[Floats, float, str]], place: Floats) -> tuple[Floats, Floats]:
+def _independent(conditions: list[Condition], place: Floats) -> tuple[Floats, Floats]:
     """Orthonormalise the constrained directions at one node, checking that the given values agree."""
     basis: list[Floats] = []
     given: list[float] = []

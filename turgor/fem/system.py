@@ -84,10 +84,14 @@ class System:
         self.loads = (*loads, *moving)
         self.load_names = _load_names(self.loads)
         self._programmes = [_programme(load) for load in self.loads]
-        held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
+        self.supports = tuple(supports)
+        self.held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
         springs = [s for s in supports if isinstance(s, ElasticSupport)]
-        self.constraints = compile_constraints(mesh, held, section)
-        beds = [SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only, section) for s in springs]
+        self.constraints = compile_constraints(mesh, self.held, section)
+        self.beds = [
+            (s.surface, SpringBed(mesh.points, mesh.surface(s.surface), s.stiffness, s.normal_only, section))
+            for s in springs
+        ]
         check_held(mesh, self.constraints, springs, section)
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         caps = [cap for cavity in self.cavities for cap in cavity.caps]
@@ -97,7 +101,15 @@ class System:
         self.contacts = [self._contact(materials, case, number) for number, case in enumerate(contact)]
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
-        self.terms: tuple[Term, ...] = (*self.solids, *self.cavities, *caps, *beds, *dead, *embedded, *self.contacts)
+        self.terms: tuple[Term, ...] = (
+            *self.solids,
+            *self.cavities,
+            *caps,
+            *(bed for _, bed in self.beds),
+            *dead,
+            *embedded,
+            *self.contacts,
+        )
         pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
         self._loaded: tuple[Loaded, ...] = (*self.cavities, *caps, *dead, *pushed)
 

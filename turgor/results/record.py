@@ -46,8 +46,9 @@ class StepRecord:
         The :data:`SOLVER_FACTS` of the step; ``stable`` is ``None`` where the solver cannot tell. ``event`` names
         what makes the state special (``"limit-pressure"``), ``time_s`` is its time where loads follow programmes.
     standing
-        How contacts (``contact``), fibres (``fibres``) and the interfaces of two materials (``interfaces``) stand, by
-        their names, in plain values with keys that end in their unit; only what the body has.
+        How contacts (``contact``), fibres (``fibres``), the interfaces of two materials (``interfaces``) and supports
+        (``supports``, by their surfaces) stand, by their names, in plain values with keys that end in their unit; only
+        what the body has.
     mode
         Eigenmode in which the body gives way in this state, ``(n, 3)``, largest component one, where it does.
     """

@@ -83,6 +83,7 @@ class RunStore:
         measures: Iterable[Choice | str] | None = None,
         section: PlaneSection | None = None,
         rigid_bodies: Iterable[str] = (),
+        supports: Iterable[str] = (),
         files: Mapping[Path, str] | None = None,
         overwrite: bool = False,
     ) -> Self:
@@ -102,6 +103,8 @@ class RunStore:
             What a plane mesh stands for.
         rigid_bodies
             Names of the rigid bodies that the actuator may meet.
+        supports
+            Names of the surfaces that supports hold.
         files
             Data file of a measure → name of its copy in the folder.
         overwrite
@@ -114,7 +117,7 @@ class RunStore:
             unknown or impossible on this mesh.
         """
         place = Path(folder)
-        body = Body(mesh, section, tuple(rigid_bodies))
+        body = Body(mesh, section, tuple(rigid_bodies), tuple(supports))
         chosen = known_measures.available(body) if measures is None else tuple(map(Choice.read, measures))
         known_measures.check(chosen, body)
         if (place / _STORE).exists() and not overwrite:
@@ -133,7 +136,8 @@ class RunStore:
         write_text(place / _CASE, text)
         save_mesh(place / _MESH, mesh)
         content: dict[str, Any] = {"layout": LAYOUT, "measures": [choice.plain(files) for choice in chosen]}
-        content |= {"section": None if section is None else asdict(section), "rigid_bodies": body.rigid_bodies}
+        content |= {"section": None if section is None else asdict(section)}
+        content |= {"rigid_bodies": body.rigid_bodies, "supports": body.supports}
         write_text(place / _STORE, json_text(content))
         store = cls(place, body, chosen, lock)
         store._write_tables()
@@ -342,6 +346,7 @@ def _read_store(folder: Path) -> tuple[Body, tuple[Choice, ...]]:
             load_mesh(folder / _MESH),
             None if section is None else PlaneSection(**section),
             tuple(content.get("rigid_bodies", ())),
+            tuple(content.get("supports", ())),
         )
         measures = tuple(Choice.read(value, folder) for value in content.get("measures", ()))
     except TypeError as error:

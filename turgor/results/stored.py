@@ -31,11 +31,14 @@ class Body:
         What a plane mesh stands for; ``None`` for a body in space.
     rigid_bodies
         Names of the rigid bodies that it may meet, each of which feels a force.
+    supports
+        Names of the surfaces that supports hold, each of which carries a force.
     """
 
     mesh: Mesh
     section: PlaneSection | None = None
     rigid_bodies: tuple[str, ...] = ()
+    supports: tuple[str, ...] = ()
 
     @cached_property
     def mechanics(self) -> Section | None:

@@ -84,7 +84,8 @@ class Model:
         )
         self.setup.check(mesh)
         check_section(mesh, section_of(section))
-        self.body = Body(mesh, section, tuple(self.setup.contact.labels) if self.setup.contact else ())
+        contact_labels = tuple(self.setup.contact.labels) if self.setup.contact else ()
+        self.body = Body(mesh, section, contact_labels, self.setup.held)
         self.measures = available(self.body) if measures is None else tuple(map(Choice.read, measures))
         check(self.measures, self.body)
 

@@ -175,6 +175,7 @@ class Path:
             measures=self.measures,
             section=self.body.section,
             rigid_bodies=self.body.rigid_bodies,
+            supports=self.body.supports,
             overwrite=overwrite,
         ) as store:
             for record in self.records:

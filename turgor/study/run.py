@@ -210,6 +210,7 @@ class _Running:
             measures=self.case.measures,
             section=self.case.geometry.section,
             rigid_bodies=contact.labels if contact else (),
+            supports=self.case.held,
             files=self.files,
             overwrite=True,
         )

@@ -92,6 +92,11 @@ class Setup(StrictModel):
         )
 
     @property
+    def held(self) -> tuple[str, ...]:
+        """The names of the surfaces that supports hold."""
+        return tuple(dict.fromkeys(support.surface for support in self.supports))
+
+    @property
     def duration(self) -> float | None:
         """The time that the load fraction runs over, s, where loads follow programmes: the longest of them."""
         programmes = [load.programme for load in self.loads if isinstance(load, PressureCase)]

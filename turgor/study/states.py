@@ -14,6 +14,7 @@ from turgor.fem.contact.surfaces import SurfaceContact
 from turgor.fem.contact.term import Contact
 from turgor.fem.fields import von_mises
 from turgor.fem.interface import Interface, interfaces
+from turgor.fem.reaction import Reactions
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.results.record import StepRecord
@@ -27,6 +28,7 @@ def to_record(
     index: int,
     wall_s: float,
     between: Sequence[Interface],
+    reactions: Reactions,
     course: Course | None = None,
 ) -> StepRecord:
     """Return the record of an equilibrium.
@@ -43,6 +45,8 @@ def to_record(
         Duration of the step in s.
     between
         The interfaces of two materials.
+    reactions
+        What its supports carry.
     course
         What the run prescribes; left out, the loads.
     """
@@ -73,7 +77,7 @@ def to_record(
             "event": equilibrium.event or "",
             **({} if duration is None else {"time_s": duration * fraction}),
         },
-        standing=standing(system, state, between),
+        standing=standing(system, state, between, reactions),
         mode=equilibrium.mode,
     )
 
@@ -94,6 +98,7 @@ class Recorder:
     def __init__(self, system: System, first: int = 0, course: Course | None = None) -> None:
         self.system = system
         self._between = interfaces(system)
+        self._reactions = Reactions(system)
         self.course = course
         self._next = first
         self.begin()
@@ -105,21 +110,24 @@ class Recorder:
     def record(self, equilibrium: Equilibrium) -> StepRecord:
         """Return the record of the next step."""
         wall_s = time.perf_counter() - self._begun
-        made = to_record(self.system, equilibrium, self._next, wall_s, self._between, self.course)
+        made = to_record(self.system, equilibrium, self._next, wall_s, self._between, self._reactions, self.course)
         self._next += 1
         self.begin()
         return made
 
 
-def standing(system: System, state: State, between: Sequence[Interface]) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return how contacts, fibres and interfaces stand in a state, in plain values; only what the system has.
+def standing(
+    system: System, state: State, between: Sequence[Interface], reactions: Reactions
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return how contacts, fibres, interfaces and supports stand in a state, in plain values; only what there is.
 
     Returns
     -------
     dict
         ``contact``: by its name, area, overlap (also in parts of the wall behind it) and what a rigid body feels;
         of the body with itself, where the IPC Toolkit is installed, whether more than 1 % of the wall overlaps;
-        ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction.
+        ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction;
+        ``supports``: by its surface, force and torque on the body.
     """
     found = {
         "contact": {contact.name: _touch(contact, state) for contact in system.contacts},
@@ -131,6 +139,7 @@ def standing(system: System, state: State, between: Sequence[Interface]) -> dict
             for embedded in system.fibres
         },
         "interfaces": {interface.name: interface.facts(state) for interface in between},
+        "supports": reactions.facts(state),
     }
     return {kind: facts for kind, facts in found.items() if facts}
 
