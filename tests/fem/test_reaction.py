@@ -97,8 +97,10 @@ def test_what_a_dynamometer_feels_is_what_the_supports_carry(own: tuple[ContactC
 def test_what_two_supports_hold_together_is_counted_once() -> None:
     mesh = box((2.0, 3.0, 4.0), (2, 2, 2))
     supports: list[Support] = [
-        *(Sliding(f"{axis}0") for axis in "xyz"), Prescribed("z1", (None, None, 0.4)), ElasticSupport("x1", 0.2, normal_only=True)
-    ]  # fmt: skip
+        *(Sliding(f"{axis}0") for axis in "xyz"),
+        Prescribed("z1", (None, None, 0.4)),
+        ElasticSupport("x1", 0.2, normal_only=True),
+    ]
     system = System(mesh, {"body": HEAVY}, supports, [Force("y1", (0.0, 0.1, 0.0))])
     force, _, _ = carried(system)
     assert sum(force.values()) == pytest.approx([0.0, -0.1, 0.0], abs=1e-7)
