@@ -469,7 +469,12 @@ def check_random(name, examples):
     )
     @given(random_actuator(name))
     def check(shape):
-        mesh = generate(shape, 2.0 * shape.default_size)
+        try:
+            mesh = generate(shape, 2.0 * shape.default_size)
+        except InputError as error:
+            # A wall of a tenth of a millimetre around a body of centimetres: refused properly, and nothing else is.
+            assume(not (error.key == "size" and error.problem.startswith("this element size needs about")))
+            raise
         assert_sound(mesh)
         assert_exact(shape, mesh, 0.01)
 
