@@ -30,12 +30,13 @@ if TYPE_CHECKING:
     from turgor.mesh.quality import quality as mesh_quality
     from turgor.mesh.walls import walls as mesh_walls
     from turgor.study.api import Model
-    from turgor.study.case import Case, load_case
+    from turgor.study.case import Case, Draft, load_case, load_draft
     from turgor.study.environment import environment
     from turgor.study.export.write import export_case
     from turgor.study.fitting import fit_document, write_fit_report, write_material
+    from turgor.study.meshing import mesh_case
     from turgor.study.path import Path
-    from turgor.study.run import Run, mesh_case, run
+    from turgor.study.run import Run, run
     from turgor.study.shapes import (
         Bellows,
         CappedTube,
@@ -54,6 +55,7 @@ __all__ = [
     "Bellows",
     "CappedTube",
     "Case",
+    "Draft",
     "FibreTube",
     "Honeycomb",
     "InputError",
@@ -78,6 +80,7 @@ __all__ = [
     "fit_document",
     "library",
     "load_case",
+    "load_draft",
     "material",
     "mesh_case",
     "mesh_quality",
@@ -107,12 +110,13 @@ _HOMES = {
     "turgor.mesh.quality": ("mesh_quality",),
     "turgor.mesh.walls": ("mesh_walls",),
     "turgor.study.api": ("Model",),
-    "turgor.study.case": ("Case", "load_case"),
+    "turgor.study.case": ("Case", "Draft", "load_case", "load_draft"),
     "turgor.study.environment": ("environment",),
     "turgor.study.export.write": ("export_case",),
     "turgor.study.fitting": ("fit_document", "write_fit_report", "write_material"),
     "turgor.study.path": ("Path",),
-    "turgor.study.run": ("Run", "mesh_case", "run"),
+    "turgor.study.meshing": ("mesh_case",),
+    "turgor.study.run": ("Run", "run"),
     "turgor.study.shapes": (
         "Bellows",
         "CappedTube",

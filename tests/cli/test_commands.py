@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     def absent(*arguments: object, **options: object) -> None:
         raise MissingPackageError("libGLU.so.1 is missing; on Debian or Ubuntu: apt-get install libglu1-mesa")
 
-    monkeypatch.setattr("turgor.study.run.generate", absent)
+    monkeypatch.setattr("turgor.study.meshing.generate", absent)
     result = turgor("run", SMALL, "--out", tmp_path / "run")
     assert result.exit_code == 2
     assert "apt-get install libglu1-mesa" in result.stderr
@@ -258,6 +259,12 @@ def test_sections_and_rows_are_meshed_too(model: str, cells: str, tmp_path: Path
     changes = ("--set", f"geometry.model={model}", "--set", f"mesh.cells={cells}", "--set", "mesh.size=5 mm")
     facts = printed("mesh", example, *changes, "--out", tmp_path / "tube.vtu", "--json")
     assert facts["elements"] > 50
+    # Of a section the area within its outline, of the quarter the volume.
+    section = 9.85 * 120 - 6.35 * 86
+    quarter = math.pi / 4 * (9.85**2 * 120 - 6.35**2 * 86)
+    name, exact = ("area_mm2", section) if model == "axisymmetric" else ("volume_mm3", quarter)
+    assert facts[name] == pytest.approx(exact, rel=1e-3)
+    assert ("walls" in facts) is False  # measured on tetrahedra only
     assert (tmp_path / "tube.vtu").stat().st_size > 1000
 
 

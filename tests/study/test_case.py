@@ -16,7 +16,7 @@ from turgor.study.build import check_sizes
 from turgor.study.case import Case, load_case
 from turgor.study.datafiles import data_names
 from turgor.study.materials import build_materials
-from turgor.study.run import mesh_case
+from turgor.study.meshing import mesh_case
 from turgor.study.setup import Setup
 
 HELD = [{"type": "clamped", "surface": "mount"}]

@@ -10,6 +10,7 @@ import yaml
 import turgor as tg
 from turgor.mesh.decks import write_deck
 from turgor.mesh.structured import shell_octant
+from turgor.study.meshing import checked_mesh
 
 
 @pytest.fixture
@@ -54,5 +55,5 @@ def test_the_ball_swells(ball: Path, tmp_path: Path) -> None:
 )
 def test_a_wrong_key_is_named(change: str, words: str, ball: Path) -> None:
     with pytest.raises(tg.InputError) as found:
-        tg.mesh_case(tg.load_case(ball, [change]))
+        checked_mesh(tg.load_case(ball, [change]))
     assert words in str(found.value)

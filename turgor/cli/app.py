@@ -220,7 +220,7 @@ def mesh(
 ) -> None:
     """Mesh the actuator of a case, write the mesh and say how good it is."""
     with naming(case_file), telling_warnings():
-        case = tg.load_case(case_file, changes or ())
+        case = tg.load_draft(case_file, changes or ())
         meshed = tg.mesh_case(case, picture)
     path = out or Path(f"{case.name}.vtu")
     tg.write_mesh(meshed, path)

@@ -91,7 +91,7 @@ def mesh_document(mesh: tg.Mesh, path: Path) -> dict[str, Any]:
         "file": str(path),
         "elements": mesh.n_cells,
         "nodes": mesh.n_points,
-        "volume_mm3": mesh.volume(),
+        "volume_mm3" if mesh.dimension == 3 else "area_mm2": mesh.volume(),
         "regions": {name: len(cells) for name, cells in mesh.regions.items()},
         "surfaces": {name: len(triangles) for name, triangles in mesh.surfaces.items()},
         "markers": {name: len(nodes) for name, nodes in mesh.markers.items()},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_text
@@ -13,8 +13,8 @@ from turgor.materials.assessment import warnings_in_use
 from turgor.mesh import Mesh
 from turgor.solver.control import ATMOSPHERE
 from turgor.study.boundary import GravityCase, PressureCase, TractionCase
-from turgor.study.case import Case
-from turgor.study.setup import check_name
+from turgor.study.case import Case, Draft
+from turgor.study.setup import unknown
 
 STIFFEST_SOLID = 5.5e5
 """Shear modulus of diamond, rounded up, MPa."""
@@ -107,7 +107,8 @@ def every_region(materials: Mapping[str, Hyperelastic], mesh: Mesh) -> dict[str,
     InputError
         If a material is given for a region that the mesh does not have, or a region has none and neither has ``body``.
     """
-    _check_regions(materials, mesh)
+    for fault in _faults_of_regions(materials, mesh):
+        raise fault
     return {region: materials.get(region) or materials["body"] for region in mesh.regions}
 
 
@@ -119,8 +120,15 @@ def check_names(case: Case, mesh: Mesh) -> None:
     InputError
         With the key and the names that there are.
     """
-    _check_regions(case.materials, mesh)
-    case.check(mesh)
+    for fault in faults_of_names(case, mesh):
+        raise fault
+
+
+def faults_of_names(case: Draft, mesh: Mesh) -> Iterator[InputError]:
+    """Yield an error for every region, surface, cavity and curve that the mesh does not have."""
+    if case.materials:
+        yield from _faults_of_regions(case.materials, mesh)
+    yield from case.faults(mesh)
 
 
 def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> System:
@@ -128,12 +136,12 @@ def system_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic]) -> 
     return case.system(mesh, every_region(materials, mesh), section=section_of(case.geometry.section))
 
 
-def _check_regions(names: Collection[str], mesh: Mesh) -> None:
+def _faults_of_regions(names: Collection[str], mesh: Mesh) -> Iterator[InputError]:
     others = set(mesh.regions) - set(names)
     for name in names:
         if name == "body" and others:
             continue  # it stands for the regions that are not named, whether or not one is called so
-        check_name(name, mesh.regions, f"materials.{name}", "region")
+        yield from unknown(name, mesh.regions, f"materials.{name}", "region")
     for region in mesh.regions:
         if region not in names and "body" not in names:
-            raise InputError(f"no material is given for the region '{region}'", key=f"materials.{region}")
+            yield InputError(f"no material is given for the region '{region}'", key=f"materials.{region}")

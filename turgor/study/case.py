@@ -9,89 +9,33 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import yaml
 from pydantic import (
     BeforeValidator,
     Field,
-    GetJsonSchemaHandler,
-    PlainSerializer,
     ValidationError,
-    ValidationInfo,
     field_validator,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from turgor.common.errors import InputError
 from turgor.common.units import PositiveLength, to_internal
 from turgor.fem.system import System
-from turgor.geometry.actuator import Actuator
-from turgor.geometry.catalogue import templates
 from turgor.geometry.imported.mesh_file import MeshFile
-from turgor.geometry.imported.solid import ImportedSolid
-from turgor.geometry.imported.step import StepFile
-from turgor.geometry.imported.stl import StlFile
 from turgor.geometry.space import Space
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
-from turgor.study.boundary import DisplacementCase, Load, PressureCase
+from turgor.study.boundary import DisplacementCase, Load, PressureCase, Support
 from turgor.study.control import ArcLengthControl, ControlCase, PressureControl
 from turgor.study.course import Course, LoadCourse, course_by
-from turgor.study.materials import FittedMaterial, MaterialChoice, in_case_folder
+from turgor.study.geometry import Geometry
+from turgor.study.materials import FittedMaterial, MaterialChoice
 from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
-from turgor.study.validation import StrictModel, collected, explain, inlined, invalid, suggestion, under
-
-
-def _known() -> dict[str, type[Actuator]]:
-    """Return every kind of shape by the name that it has in a case file."""
-    return {**templates(), **{kind.template: kind for kind in (StepFile, StlFile, MeshFile)}}
-
-
-def _actuator(value: object, info: ValidationInfo) -> object:
-    """Read ``{template: name, …its parameters}``; a template that is already built passes."""
-    if not isinstance(value, dict):
-        return value
-    parameters = dict(value)
-    name = parameters.pop("template", None)
-    known = _known()
-    if not isinstance(name, str) or name not in known:
-        problem = "this key is missing" if name is None else "unknown template"
-        raise InputError(problem, key="geometry.template", value=name, expected=suggestion(str(name), known))
-    if issubclass(known[name], (ImportedSolid, MeshFile)) and "file" in parameters:
-        kind = name if name == MeshFile.template else name.upper()
-        parameters["file"] = str(in_case_folder(parameters["file"], info, kind, "file"))
-    try:
-        return known[name](**parameters)
-    except InputError as error:
-        raise under(error, "geometry") from error
-
-
-def _template_and_parameters(actuator: Actuator) -> dict[str, Any]:
-    return {"template": actuator.template, **actuator.model_dump(mode="json", exclude_none=True)}
-
-
-class _GeometrySchema:
-    """JSON Schema of the geometry: one alternative a template, so that an editor completes its parameters."""
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        alternatives = []
-        for name, template in _known().items():
-            schema = template.model_json_schema()
-            # What pydantic refers to from here it would look for in the schema of the whole case.
-            schema = inlined(schema, schema.pop("$defs", {}))
-            schema["properties"] = {"template": {"const": name}, **schema["properties"]}
-            schema["required"] = ["template", *schema.get("required", [])]
-            alternatives.append(schema)
-        return {"oneOf": alternatives}
-
-
-Geometry = Annotated[Actuator, BeforeValidator(_actuator), PlainSerializer(_template_and_parameters), _GeometrySchema]
+from turgor.study.validation import StrictModel, collected, explain, invalid
 
 
 class MeshCase(StrictModel):
@@ -156,18 +100,16 @@ class SolverCase(StrictModel):
         return self
 
 
-class Case(Setup):
-    """One study of one actuator: what it is made of, how it is held and loaded, and what is to be known of it.
-
-    Made from a file by :func:`load_case`. Quantities are kept in internal units and written back with them.
-    """
+class Draft(Setup):
+    """A case that may still lack materials, supports and loads: enough to be meshed. What it says must be right."""
 
     name: str = Field(default="case", description="the run's name and default folder; left out, the file's name")
     geometry: Geometry
-    materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
+    materials: dict[str, MaterialChoice] = Field(default={}, description="region of the actuator: its material")
     regions: dict[str, RegionCase] = Field(default={}, description="further regions by parts of space")
     mesh: MeshCase = MeshCase()
-    loads: tuple[Load, ...] = Field(min_length=1)
+    supports: tuple[Support, ...] = ()
+    loads: tuple[Load, ...] = ()
     largest_stretch: float = Field(
         default=2.0, strict=True, gt=1.0, description="up to which the softest material is examined before the run"
     )
@@ -195,7 +137,8 @@ class Case(Setup):
             if isinstance(load, PressureCase):
                 self._check_pressure(load, f"loads.{number}")
         if isinstance(self.control, PressureControl):
-            self.fractions()
+            if self.loads:
+                self.fractions()
         elif any(isinstance(support, DisplacementCase) for support in self.supports):
             raise invalid("the supports move with the load, which is not given", key="control", expected=BY_LOADS)
         elif self.contact is not None and any(body.move is not None for body in self.contact.bodies):
@@ -249,6 +192,17 @@ class Case(Setup):
             end = "the load's" if what == "pressure" else "the end of the programmes"
             raise invalid(f"these {what}s do not lead from 0 to {end}", key=key, expected=expected)
         return fractions
+
+
+class Case(Draft):
+    """One study of one actuator: what it is made of, how it is held and loaded, and what is to be known of it.
+
+    Made from a file by :func:`load_case`. Quantities are kept in internal units and written back with them.
+    """
+
+    materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
+    supports: tuple[Support, ...] = Field(min_length=1)
+    loads: tuple[Load, ...] = Field(min_length=1)
 
     @property
     def data_files(self) -> list[Path]:
@@ -312,6 +266,9 @@ _FIRST = ("name", "geometry", "materials", "mesh")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
+Kind = TypeVar("Kind", bound=Draft)
+
+
 def load_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
     """Read a case file.
 
@@ -327,12 +284,21 @@ def load_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
     InputError
         If the file or a change is not well formed; names the file (or ``--set``), the key and the value.
     """
+    return _load(Case, path, changes)
+
+
+def load_draft(path: str | Path, changes: Sequence[str] = ()) -> Draft:
+    """Read a case file that may still lack materials, supports and loads; otherwise as :func:`load_case`."""
+    return _load(Draft, path, changes)
+
+
+def _load(kind: type[Kind], path: str | Path, changes: Sequence[str]) -> Kind:
     path = Path(path)
     data = read_mapping(path)
     data.setdefault("name", _name_from(path))
     changed = [override(data, change) for change in changes]
     try:
-        return Case.model_validate(data, context={"folder": path.parent})
+        return kind.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
         found = explain(error, data)
     except InputError as error:

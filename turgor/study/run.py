@@ -16,13 +16,7 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.common.units import from_internal
 from turgor.fem.system import System
-from turgor.geometry.imported.mesh_file import MeshFile
-from turgor.geometry.imported.surface import BrokenSurfaceError
 from turgor.mesh import Mesh
-from turgor.mesh.generate import generate
-from turgor.mesh.imported import read_actuator
-from turgor.mesh.named_parts import save_fault, save_named_parts
-from turgor.mesh.partition import partition
 from turgor.results.archive import Row
 from turgor.results.report import report
 from turgor.results.store import RunStore
@@ -30,17 +24,17 @@ from turgor.results.summary import Summary, summarise
 from turgor.solver.events import Event, Outcome
 from turgor.solver.newton import Equilibrium
 from turgor.solver.stops import StoppedShortError
-from turgor.study.build import check_names, check_sizes, doubts, system_of
-from turgor.study.case import Case, MeshCase
+from turgor.study.build import check_sizes, doubts, system_of
+from turgor.study.case import Case
 from turgor.study.course import Course
 from turgor.study.datafiles import copy_data, data_names, same_data
 from turgor.study.fitting import fit_document
 from turgor.study.machine import peak_memory_mb
 from turgor.study.materials import FittedMaterial, build_materials
+from turgor.study.meshing import checked_mesh
 from turgor.study.progress import Progress, Silent
 from turgor.study.runlog import RunLog
 from turgor.study.states import Recorder, to_equilibrium
-from turgor.study.validation import under
 
 log = logger("study")
 
@@ -112,56 +106,6 @@ def run(
         return _Running(case, place, progress or Silent(), run_log).run(continues=stored and resume)
 
 
-def mesh_case(case: Case, picture: str | Path | None = None) -> Mesh:
-    """Return the mesh of a case, with the names that its supports and loads use made sure of.
-
-    Parameters
-    ----------
-    case
-        What to mesh.
-    picture
-        A .png file that shows which parts have which names, or, where there is no mesh because the surface of an STL
-        file is broken, where it is.
-
-    Raises
-    ------
-    InputError
-        If there is no valid mesh, or a region, surface or cavity of the case is not on it.
-    """
-    try:
-        mesh = _divided(case)
-    except BrokenSurfaceError as error:
-        if picture:
-            save_fault(error.points, error.triangles, error.wrong, picture)
-        raise
-    if picture:
-        save_named_parts(mesh, picture)
-    check_names(case, mesh)
-    return mesh
-
-
-def _divided(case: Case) -> Mesh:
-    """Return the mesh of a case with its regions."""
-    how = case.mesh
-    try:
-        if isinstance(case.geometry, MeshFile):
-            mesh = read_actuator(case.geometry)
-        else:
-            mesh = generate(
-                case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells, layers=how.layers
-            )
-    except InputError as error:
-        field = (error.key or "").split(".")[0]
-        if field in MeshCase.model_fields:
-            raise under(error, "mesh") from error
-        raise (under(error, "geometry") if field in type(case.geometry).model_fields else error) from error
-    if case.regions:
-        spaces = {name: region.where for name, region in case.regions.items()}
-        least = {name: region.at_least for name, region in case.regions.items()}
-        mesh = partition(mesh, spaces, at_least=least)
-    return mesh
-
-
 class _Running:
     """One run on its way; the parts of :func:`run` share what is here."""
 
@@ -198,7 +142,7 @@ class _Running:
 
     def _meshed(self) -> Mesh:
         self.show.stage("mesh")
-        return mesh_case(self.case)
+        return checked_mesh(self.case)
 
     def _created(self, mesh: Mesh) -> RunStore:
         text = self.case.to_yaml(self.files)

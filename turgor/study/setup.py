@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Self
 
 from pydantic import Field, ValidationError
@@ -46,23 +46,16 @@ class Setup(StrictModel):
         InputError
             With the key and the names that there are.
         """
+        for fault in self.faults(mesh):
+            raise fault
+
+    def faults(self, mesh: Mesh) -> Iterator[InputError]:
+        """Yield an error for every surface, cavity, region and curve that the mesh does not have."""
         for number, support in enumerate(self.supports):
-            check_name(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
-        cavities = cavities_of(mesh)
-        for number, load in enumerate(self.loads):
-            if isinstance(load, PressureCase) and not cavities:
-                raise InputError(
-                    "no air can be kept in this shape: it has no closed cavity",
-                    key=f"loads.{number}.cavity",
-                    value=load.cavity,
-                    expected="a closed pocket, or caps in the geometry for the openings of one",
-                )
-            if isinstance(load, PressureCase):
-                check_name(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
-            elif not isinstance(load, GravityCase):
-                check_name(load.surface, mesh.surfaces, f"loads.{number}.surface", "surface")
-        self._check_contact(mesh)
-        self._check_reinforcements(mesh)
+            yield from unknown(support.surface, mesh.surfaces, f"supports.{number}.surface", "surface")
+        yield from self._faults_of_loads(mesh)
+        yield from self._faults_of_contact(mesh)
+        yield from self._faults_of_reinforcements(mesh)
 
     def system(
         self,
@@ -112,33 +105,48 @@ class Setup(StrictModel):
         sheets = [sheet.build() for sheet in self.sheets]
         return [*threads, *sheets, *(family.build() for family in self.fibre_families)]
 
-    def _check_contact(self, mesh: Mesh) -> None:
+    def _faults_of_loads(self, mesh: Mesh) -> Iterator[InputError]:
+        cavities = cavities_of(mesh)
+        for number, load in enumerate(self.loads):
+            if isinstance(load, PressureCase) and not cavities:
+                yield InputError(
+                    "no air can be kept in this shape: it has no closed cavity",
+                    key=f"loads.{number}.cavity",
+                    value=load.cavity,
+                    expected="a closed pocket, or caps in the geometry for the openings of one",
+                )
+            elif isinstance(load, PressureCase):
+                yield from unknown(load.cavity, cavities, f"loads.{number}.cavity", "cavity")
+            elif not isinstance(load, GravityCase):
+                yield from unknown(load.surface, mesh.surfaces, f"loads.{number}.surface", "surface")
+
+    def _faults_of_contact(self, mesh: Mesh) -> Iterator[InputError]:
         if self.contact is None:
             return
         for number, names in enumerate(self.contact.pairs):
             for side, name in enumerate(names):
-                check_name(name, mesh.surfaces, f"contact.pairs.{number}.{side}", "surface")
+                yield from unknown(name, mesh.surfaces, f"contact.pairs.{number}.{side}", "surface")
         for number, body in enumerate(self.contact.bodies):
             if body.surface is not None:
-                check_name(body.surface, mesh.surfaces, f"contact.bodies.{number}.surface", "surface")
+                yield from unknown(body.surface, mesh.surfaces, f"contact.bodies.{number}.surface", "surface")
 
-    def _check_reinforcements(self, mesh: Mesh) -> None:
+    def _faults_of_reinforcements(self, mesh: Mesh) -> Iterator[InputError]:
         for key in ("fibres", "sheets", "fibre_families"):
             if getattr(self, key) and mesh.dimension != 3:
-                raise InputError("a plane section cannot have these", key=key, expected="a body in space")
+                yield InputError("a plane section cannot have these", key=key, expected="a body in space")
         for number, fibre in enumerate(self.fibres):
             key = f"fibres.{number}.curve"
             if not mesh.curves:
-                raise InputError("the actuator has no curves for fibres to run along", key=key, expected="no fibres")
-            if fibre.curve is not None:
-                check_name(fibre.curve, mesh.curves, key, "curve")
+                yield InputError("the actuator has no curves for fibres to run along", key=key, expected="no fibres")
+            elif fibre.curve is not None:
+                yield from unknown(fibre.curve, mesh.curves, key, "curve")
         for number, sheet in enumerate(self.sheets):
             if sheet.surface is not None:
-                check_name(sheet.surface, mesh.surfaces, f"sheets.{number}.surface", "surface")
+                yield from unknown(sheet.surface, mesh.surfaces, f"sheets.{number}.surface", "surface")
             for side, region in enumerate(sheet.between or ()):
-                check_name(region, mesh.regions, f"sheets.{number}.between.{side}", "region")
+                yield from unknown(region, mesh.regions, f"sheets.{number}.between.{side}", "region")
         for number, family in enumerate(self.fibre_families):
-            check_name(family.region, mesh.regions, f"fibre_families.{number}.region", "region")
+            yield from unknown(family.region, mesh.regions, f"fibre_families.{number}.region", "region")
 
 
 def cavities_of(mesh: Mesh) -> list[str]:
@@ -146,10 +154,10 @@ def cavities_of(mesh: Mesh) -> list[str]:
     return [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
 
 
-def check_name(name: str, known: Iterable[str], key: str, kind: str) -> None:
-    """Refuse a name that is not among the `known` ones of its `kind`."""
+def unknown(name: str, known: Iterable[str], key: str, kind: str) -> Iterator[InputError]:
+    """Yield an error if a name is not among the `known` ones of its `kind`."""
     if name not in known:
-        raise InputError(f"the actuator has no such {kind}", key=key, value=name, expected=suggestion(name, known))
+        yield InputError(f"the actuator has no such {kind}", key=key, value=name, expected=suggestion(name, known))
 
 
 def _plain(part: Any) -> Any:

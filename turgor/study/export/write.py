@@ -11,7 +11,7 @@ from turgor.study.case import Case
 from turgor.study.export import calculix, febio
 from turgor.study.export.problem import Problem, problem_of
 from turgor.study.materials import build_materials
-from turgor.study.run import mesh_case
+from turgor.study.meshing import checked_mesh
 
 _Writer = Callable[[Problem], Iterator[str]]
 _PROGRAMS: dict[str, tuple[str, _Writer]] = {
@@ -47,7 +47,7 @@ def export_case(case: Case, path: str | Path) -> Mesh:
         raise InputError("models of this kind are not written", file=path, value=path.suffix, expected=expected)
     program, writer = _PROGRAMS[path.suffix]
     materials, _ = build_materials(case.materials)
-    mesh = mesh_case(case)
+    mesh = checked_mesh(case)
     lines = list(writer(problem_of(case, mesh, materials, program)))
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")

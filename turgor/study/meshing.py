@@ -1,0 +1,91 @@
+"""From a case to its mesh: for a run every name must be on it; who only looks at the mesh is told which are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from turgor.common.errors import InputError
+from turgor.common.log import logger
+from turgor.geometry.imported.mesh_file import MeshFile
+from turgor.geometry.imported.surface import BrokenSurfaceError
+from turgor.mesh import Mesh
+from turgor.mesh.generate import generate
+from turgor.mesh.imported import read_actuator
+from turgor.mesh.named_parts import save_fault, save_named_parts
+from turgor.mesh.partition import partition
+from turgor.study.build import check_names, faults_of_names
+from turgor.study.case import Case, Draft, MeshCase
+from turgor.study.validation import under
+
+log = logger("study")
+
+
+def mesh_case(case: Draft, picture: str | Path | None = None) -> Mesh:
+    """Return the mesh of a case, and warn of what a run of it would refuse.
+
+    That is every name in its materials, supports and loads that the mesh does not have, and every plane of symmetry
+    that no support holds: what is left behind when another `model` of the same shape is meshed.
+
+    Parameters
+    ----------
+    case
+        What to mesh; of a draft only what it says so far is looked at.
+    picture
+        A .png file that shows which parts have which names, or, where there is no mesh because the surface of an STL
+        file is broken, where it is.
+
+    Raises
+    ------
+    InputError
+        If there is no valid mesh.
+    """
+    try:
+        mesh = _divided(case)
+    except BrokenSurfaceError as error:
+        if picture:
+            save_fault(error.points, error.triangles, error.wrong, picture)
+        raise
+    if picture:
+        save_named_parts(mesh, picture)
+    for fault in faults_of_names(case, mesh):
+        log.warning("%s", fault)
+    held = {support.surface for support in case.supports}
+    for name in mesh.surfaces:
+        if held and name.startswith("symmetry") and name not in held:
+            log.warning("supports: nothing holds the cut '%s'; a run needs {type: sliding, surface: %s}", name, name)
+    return mesh
+
+
+def checked_mesh(case: Case) -> Mesh:
+    """Return the mesh of a case.
+
+    Raises
+    ------
+    InputError
+        If there is no valid mesh, or a region, surface or cavity of the case is not on it.
+    """
+    mesh = _divided(case)
+    check_names(case, mesh)
+    return mesh
+
+
+def _divided(case: Draft) -> Mesh:
+    """Return the mesh of a case with its regions."""
+    how = case.mesh
+    try:
+        if isinstance(case.geometry, MeshFile):
+            mesh = read_actuator(case.geometry)
+        else:
+            mesh = generate(
+                case.geometry, how.size, sizes=how.sizes, per_circle=how.per_circle, cells=how.cells, layers=how.layers
+            )
+    except InputError as error:
+        field = (error.key or "").split(".")[0]
+        if field in MeshCase.model_fields:
+            raise under(error, "mesh") from error
+        raise (under(error, "geometry") if field in type(case.geometry).model_fields else error) from error
+    if case.regions:
+        spaces = {name: region.where for name, region in case.regions.items()}
+        least = {name: region.at_least for name, region in case.regions.items()}
+        mesh = partition(mesh, spaces, at_least=least)
+    return mesh
