@@ -61,15 +61,25 @@ def turned(points, twist):
 def test_a_thin_strip_bends_as_the_elastica(strength):
     # A cantilever of bending stiffness B under a force P across its end, P L²/B = `strength`: θ'' = −strength cos θ,
     # θ(0) = 0, θ'(1) = 0 (Euler 1744; Bisshopp and Drucker 1945). In plane strain B = E/(1 − ν²) h³/12.
-    length, thickness, depth = 100.0, 1.0, 2.0
+    system = strip(strength)
+    (found,) = solve_path(system, [1.0])
+    mesh = system.mesh
+    moved = (mesh.points + found.state.u)[mesh.surface_nodes("x1")].mean(axis=0) - [0.0, THICKNESS / 2]
+    assert moved / LENGTH == pytest.approx(elastica(strength), rel=5e-3)
+    # From rest to 72° at the stronger force: 12 iterations, 32 and cut steps if the stress does not lag.
+    assert found.iterations < 20
+
+
+LENGTH, THICKNESS = 100.0, 1.0
+
+
+def strip(strength: float) -> System:
+    depth = 2.0
     rubber = neo_hookean(MU, 1e4)
-    stiffness = rubber.young_modulus / (1 - rubber.poisson_ratio**2) * depth * thickness**3 / 12
-    mesh = rectangle((length, thickness), (40, 1), "quad9")
-    load = Force("x1", (0.0, strength * stiffness / length**2, 0.0))
-    system = System(mesh, {"body": rubber}, [Clamped("x0")], [load], section=PlaneStrain(depth))
-    state = solve_path(system, [0.2, 0.6, 1.0])[-1].state
-    moved = (mesh.points + state.u)[mesh.surface_nodes("x1")].mean(axis=0) - [0.0, thickness / 2]
-    assert moved / length == pytest.approx(elastica(strength), rel=5e-3)
+    stiffness = rubber.young_modulus / (1 - rubber.poisson_ratio**2) * depth * THICKNESS**3 / 12
+    mesh = rectangle((LENGTH, THICKNESS), (40, 1), "quad9")
+    load = Force("x1", (0.0, strength * stiffness / LENGTH**2, 0.0))
+    return System(mesh, {"body": rubber}, [Clamped("x0")], [load], section=PlaneStrain(depth))
 
 
 def elastica(strength: float) -> np.ndarray:

@@ -14,6 +14,7 @@ from turgor.fem.loads import Force, Gravity, Pressure, Traction
 from turgor.fem.pattern import packed_size
 from turgor.fem.section import Axisymmetric, PlaneStrain, PlaneStress
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
+from turgor.fem.sheet import Sheet
 from turgor.fem.system import System
 from turgor.materials.models.mooney_rivlin import MooneyRivlin2
 from turgor.materials.models.ogden import Ogden2
@@ -93,11 +94,13 @@ def test_what_lags_follows_a_small_step(case):
     state = random_state(system, 0.02)
     direction = np.random.default_rng(8).standard_normal(state.u.shape)
     solid = system.solids[0]
-    if solid.modes.shape[2] == 0:
-        return
     expected = differences(lambda at: system.consistent(at.u, at.loads).lagged[0], state, direction)
     change = solid.lagged_after(state, direction) - state.lagged[0]
     assert np.abs(change).max() > 0.1
+    if isinstance(solid, Sheet):
+        # No geometric stiffness takes the stress across a sheet.
+        in_plane = np.arange(6 * solid.dV.shape[1]).reshape(-1, 6)[:, [0, 1, 3]].ravel()
+        change, expected = change[:, in_plane], expected[:, in_plane]
     np.testing.assert_allclose(change, expected, atol=1e-8)
 
 

@@ -132,28 +132,65 @@ def deformation(u, cells, G, dV, modes, F, J, dilatation):  # type: ignore[no-un
 
 
 @parallel
-def dilatation_changes(du, cells, F, G, dV, modes, change):  # type: ignore[no-untyped-def]
-    """Fill ``change (m, k)``, the derivative of the dilatations of :func:`deformation` along `du` ``(n_points, d)``."""
+def linear_changes(du, cells, F, G, dV, modes, tau, tangent, dilatation, stress):  # type: ignore[no-untyped-def]
+    """Add to ``dilatation (m, k)`` its change along `du` ``(n_points, d)``; fill ``stress (m, q, 6)``, changed too.
+
+    The stress is the second Piola–Kirchhoff stress that belongs to the Kirchhoff stress ``tau (m, q, 6)``, and changes
+    with the Green–Lagrange strain: ``S = F⁻¹ (τ + c : sym(∇du)) F⁻ᵀ``, c the spatial ``tangent (m, q, 21)``.
+    """
     for chunk in nb.prange(CHUNKS):
         local = np.empty((du.shape[1], cells.shape[1]))
         H = np.empty((3, 3))
         inv = np.empty((3, 3))
+        spatial = np.empty((3, 3))
+        strain = np.empty(6)
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
             gather(du, cells[e], local)
-            change[e] = 0.0
             volume = 0.0
             for q in range(G.shape[1]):
+                volume += dV[e, q]
+            for q in range(G.shape[1]):
                 displacement_gradient(local, G[e, q], H)
-                weight = inverse(F[e, q], inv) * dV[e, q]
-                trace = 0.0
+                weight = inverse(F[e, q], inv) * dV[e, q] / volume
                 for i in range(3):
                     for j in range(3):
-                        trace += inv[j, i] * H[i, j]
-                volume += dV[e, q]
+                        spatial[i, j] = H[i, 0] * inv[0, j] + H[i, 1] * inv[1, j] + H[i, 2] * inv[2, j]
+                for i in range(3):
+                    for j in range(i, 3):
+                        strain[SYM[i, j]] = spatial[i, i] if i == j else spatial[i, j] + spatial[j, i]
                 for k in range(modes.shape[2]):
-                    change[e, k] += modes[e, q, k] * weight * trace
-            for k in range(modes.shape[2]):
-                change[e, k] /= volume
+                    dilatation[e, k] += modes[e, q, k] * weight * (strain[0] + strain[1] + strain[2])
+                for i in range(3):
+                    for j in range(i, 3):
+                        value = tau[e, q, SYM[i, j]]
+                        for r in range(6):
+                            value += tangent[e, q, PACK[SYM[i, j], r]] * strain[r]
+                        spatial[i, j] = value
+                        spatial[j, i] = value
+                sandwich(inv, spatial, stress[e, q])
+
+
+@parallel
+def transformed(A, B, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (m, q, 6)`` with the symmetric tensors ``A B Aᵀ``, ``A (m, q, 3, 3)`` and ``B (m, q, 6)``."""
+    for e in nb.prange(len(A)):
+        full = np.empty((3, 3))
+        for q in range(A.shape[1]):
+            for i in range(3):
+                for j in range(3):
+                    full[i, j] = B[e, q, SYM[i, j]]
+            sandwich(A[e, q], full, out[e, q])
+
+
+@inlined
+def sandwich(A, B, out):  # type: ignore[no-untyped-def]
+    """Write the symmetric tensor ``A B Aᵀ`` of ``A, B (3, 3)`` into ``out (6,)``."""
+    half = np.empty(3)
+    for i in range(3):
+        for k in range(3):
+            half[k] = A[i, 0] * B[0, k] + A[i, 1] * B[1, k] + A[i, 2] * B[2, k]
+        for j in range(i, 3):
+            out[SYM[i, j]] = half[0] * A[j, 0] + half[1] * A[j, 1] + half[2] * A[j, 2]
 
 
 @inlined

@@ -26,10 +26,12 @@ class Solid:
     """∫ W(F̄) + U(θ) dV over one material region, θ the projection of J on the pressure modes of each element.
 
     In tetrahedra and triangles θ is the element's ratio of volumes (Nagtegaal, Parks and Rice 1974), in hexahedra and
-    quadrilaterals it is linear (Simo, Taylor and Pister 1985): this frees the elements of volumetric locking. The
-    coefficients of θ are what lags (:class:`turgor.fem.term.Term`): the geometric stiffness uses the pressure U'(θ) of
-    the lagged ones, so that the iteration sees the volume constraint as linear and converges in long steps at any bulk
-    modulus.
+    quadrilaterals it is linear (Simo, Taylor and Pister 1985): this frees the elements of volumetric locking.
+
+    Two things lag (:class:`turgor.fem.term.Term`): the coefficients of θ, so that the iteration sees the volume
+    constraint as linear and converges in long steps at any bulk modulus; and the isochoric second Piola–Kirchhoff stress
+    S at the quadrature points, so that walls which are stiff against stretching but bend easily turn far in one
+    step (Magisano, Leonetti and Garcea 2017: mixed integration points). The geometric stiffness takes U'(θ) and S from them.
 
     Parameters
     ----------
@@ -67,21 +69,31 @@ class Solid:
         self._dilatation = np.empty((m, self.modes.shape[2]))
         self._tau = np.empty((m, q, 6))
         self._tangent = np.empty((m, q, TANGENT_SIZE))
+        self._lagged_tau = np.empty((m, q, 6))
         self._force = np.empty((m, n, self.cell.dimension))
         self._places = kernels.packing(n, self.cell.dimension)
 
     def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the coefficients of θ at displacement `u`, ``(m, k)``; the first is the element's ratio of volumes."""
+        """Return what lags at displacement `u`, ``(m, k + 6 q)``.
+
+        The coefficients of θ, of which the first is the element's ratio of volumes, then the components of S.
+        """
         del loads
-        self._deform(u)
-        return self._dilatation.copy()
+        return self.lagged_after(State(u, (), np.empty(0)), np.zeros_like(u))
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the coefficients of θ ``(m, k)`` that the step `du` ``(n_points, d)`` predicts, linearised."""
+        """Return what lags ``(m, k + 6 q)`` as the step `du` ``(n_points, d)`` predicts it, linearised."""
         self._deform(state.u)
-        change = np.empty_like(self._dilatation)
-        kernels.dilatation_changes(du, self.nodes, self._F, self.G, self.dV, self.modes, change)
-        return self._dilatation + change
+        self._respond()
+        m, q, k = self.modes.shape
+        after = np.empty((m, k + 6 * q))
+        after[:, :k] = self._dilatation
+        stress = np.empty((m, q, 6))
+        kernels.linear_changes(
+            du, self.nodes, self._F, self.G, self.dV, self.modes, self._tau, self._tangent, after[:, :k], stress
+        )
+        after[:, k:] = stress.reshape(m, 6 * q)
+        return after
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F over the quadrature points and the mesh cell where it is."""
@@ -119,7 +131,7 @@ class Solid:
         """
         self._deform(state.u)
         density = self._law()[0].reshape(self.dV.shape)
-        law, expected = self.material.volumetric, self._at_points(lagged)
+        law, expected = self.material.volumetric, self._at_points(self._lagged_dilatation(lagged))
         deviation = self._at_points(self._dilatation) - expected
         bulk = AUGMENTATION * self.material.shear_modulus
         volumetric = law.energy(expected) + law.pressure(expected) * deviation + 0.5 * bulk * deviation**2
@@ -137,15 +149,17 @@ class Solid:
         """Fill the element stiffnesses, the pressure condensed."""
         self._deform(state.u)
         self._respond()
+        dilatation = self._lagged_dilatation(lagged)
+        kernels.transformed(self._F, self._lagged_stress(lagged), self._lagged_tau)
         kernels.element_stiffness(
             self._F,
             self.G,
             self.dV,
-            self._tau,
+            self._lagged_tau,
             self._tangent,
-            self._pressure(lagged),
+            self._pressure(dilatation),
             self.modes,
-            self._bulk(lagged),
+            self._bulk(dilatation),
             self.cell.dimension,
             self._places,
             out,
@@ -159,7 +173,8 @@ class Solid:
     def mean_pressure(self, state: State, lagged: Floats) -> Floats:
         """Return the mean of U'(θ) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
         del state
-        mean: Floats = np.einsum("mq,mq->m", self._pressure(lagged), self.dV) / self.volume
+        pressure = self._pressure(self._lagged_dilatation(lagged))
+        mean: Floats = np.einsum("mq,mq->m", pressure, self.dV) / self.volume
         return mean
 
     def cauchy_stress(self, state: State) -> Floats:
@@ -169,6 +184,12 @@ class Solid:
         stress = self._tau / self._J[:, :, None]
         stress[:, :, :3] += self._pressure(self._dilatation)[:, :, None]
         return np.asarray(stress)
+
+    def _lagged_dilatation(self, lagged: Floats) -> Floats:
+        return lagged[:, : self.modes.shape[2]]
+
+    def _lagged_stress(self, lagged: Floats) -> Floats:
+        return np.ascontiguousarray(lagged[:, self.modes.shape[2] :]).reshape(*self.dV.shape, 6)
 
     def _modes(self, nodes: Floats) -> Floats:
         return pressure_modes(nodes, self.cell, self.dV)

@@ -19,7 +19,7 @@ class State:
     u
         Displacement ``(n_points, 3)``, mm.
     lagged
-        For each term, the quantities that Newton's iteration treats as unknowns of their own: the mean dilatation of
+        For each term, the quantities that Newton's iteration treats as unknowns of their own: dilatation and stress of
         every element of a solid, nothing for most terms. At an equilibrium they follow from the displacement; on the
         way they lag behind it, and the tangent uses the forces that belong to them.
     loads
