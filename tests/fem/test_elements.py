@@ -13,8 +13,8 @@ from turgor.fem.frames import block_products
 from turgor.fem.loads import Force, Gravity, Pressure, Traction
 from turgor.fem.pattern import packed_size
 from turgor.fem.section import Axisymmetric, PlaneStrain, PlaneStress
-from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.sheet import Sheet
+from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.system import System
 from turgor.materials.models.mooney_rivlin import MooneyRivlin2
 from turgor.materials.models.ogden import Ogden2

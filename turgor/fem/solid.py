@@ -29,9 +29,10 @@ class Solid:
     quadrilaterals it is linear (Simo, Taylor and Pister 1985): this frees the elements of volumetric locking.
 
     Two things lag (:class:`turgor.fem.term.Term`): the coefficients of θ, so that the iteration sees the volume
-    constraint as linear and converges in long steps at any bulk modulus; and the isochoric second Piola–Kirchhoff stress
-    S at the quadrature points, so that walls which are stiff against stretching but bend easily turn far in one
-    step (Magisano, Leonetti and Garcea 2017: mixed integration points). The geometric stiffness takes U'(θ) and S from them.
+    constraint as linear and converges in long steps at any bulk modulus; and the isochoric second Piola–Kirchhoff
+    stress S at the quadrature points, so that walls which are stiff against stretching but bend easily turn far in one
+    step (Magisano, Leonetti and Garcea 2017: mixed integration points). The geometric stiffness takes U'(θ) and S from
+    them.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,5 +48,13 @@ class State:
 
     def beyond(self, before: State, reach: float) -> State:
         """Return the state `reach` times the way from `before` to this one further on, in a straight line."""
-        lagged = tuple(now + reach * (now - then) for now, then in zip(self.lagged, before.lagged, strict=True))
-        return replace(self, u=self.u + reach * (self.u - before.u), lagged=lagged)
+        return self.mixed((-reach, 1.0 + reach), (before, self))
+
+    def mixed(self, weights: Sequence[float], states: Sequence[State]) -> State:
+        """Return this state with displacement and what lags replaced by the weighted sum of those of other states."""
+
+        def total(values: Iterable[Floats]) -> Floats:
+            return np.asarray(sum(weight * value for weight, value in zip(weights, values, strict=True)))
+
+        lagged = tuple(total(values) for values in zip(*(state.lagged for state in states), strict=True))
+        return replace(self, u=total(state.u for state in states), lagged=lagged)

@@ -90,7 +90,7 @@ def follow(
                 on_progress(part, found.iterations, found.residuals[-1])
             if previous.rising != found.rising:
                 post.send_limit(walk.limit_between(previous, found))
-                walk.before, walk.here = previous, found
+                walk.stand_at(found, previous)
         if walk.here is not post.last:
             post.send(walk.here)
     return post.sent
@@ -147,14 +147,14 @@ def follow_arc(
             raise _ended(walk, post)
         if sign * (walk.measure(found) - target) > 0.0:
             # The end is cut by volume; between the two the path is as good as straight.
-            walk.before, walk.here = walk.here, found
+            walk.stand_at(found, walk.here)
             found = walk.at(target)
         post.tally.count(found)
         if on_progress is not None:
             on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
         if previous.rising != found.rising and arc.is_flat(previous, found):
             post.send_limit(walk.limit_between(previous, found))
-        walk.before, walk.here = previous, found
+        walk.stand_at(found, previous)
         post.send(found)
     return post.sent
 

@@ -41,7 +41,7 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         If the branch does not rise to the limit again as far as it could be followed.
     """
     goal = limit.equilibrium.fraction
-    walk.before, walk.here = limit.equilibrium, beyond
+    walk.stand_at(beyond, limit.equilibrium)
     rest = abs(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights))
     previous, lowest = beyond, beyond.fraction
     ended = f"after {SNAP_STEPS} steps"
@@ -73,7 +73,7 @@ def _at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibri
         try:
             found = find_equilibrium(walk.system, walk.linear, guess, goal, walk.options)
         except NotConvergedError:
-            walk.before, walk.here = below, above
+            walk.stand_at(above, below)
             middle = walk.at(0.5 * (walk.measure(below) + walk.measure(above)))
             tally.count(middle)
             below, above = (middle, above) if middle.fraction < goal else (below, middle)

@@ -19,6 +19,7 @@ from turgor.solver.events import Event
 from turgor.solver.limits import after_snap
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
+from turgor.solver.prediction import extrapolated
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, softest_mode
@@ -39,6 +40,9 @@ LARGE_CHANGE = 1.0
 """Part of the conjugate by which a step may change it without being asked whether it has jumped."""
 
 MONOTONE = 3.0
+
+LONGEST_REACH = 2.0
+"""Lengths of the last step by which the next one is predicted at most."""
 
 STIFFER = 6
 """How often contact is made stiffer before one equilibrium is given up."""
@@ -142,7 +146,7 @@ def solve_path(
 
 
 class _Walk:
-    """The last two equilibria and the step length: what the next step is predicted from."""
+    """The last three equilibria and the step length: what the next step is predicted from."""
 
     def __init__(
         self,
@@ -158,7 +162,7 @@ class _Walk:
         self.on_progress = on_progress
         self.linear: LinearSolver = make_linear_solver(system.pattern.row_start, system.pattern.column)
         self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
-        self.before: Equilibrium | None = None
+        self.past: tuple[Equilibrium, ...] = ()
         self.step = options.largest_step
         self._tally = Tally()
         self._delivered = start
@@ -187,11 +191,12 @@ class _Walk:
             found = self._try(aim, target)
             if found is not None:
                 # A snap leads nowhere that could be gone on with.
-                self.before = None if found.event is Event.POST_SNAP else self.here
+                past = () if found.event is Event.POST_SNAP else (*self.past, self.here)[-2:]
                 self._arrive(found)
+                self.past = past
         if target in self.system.kinks:
             # Beyond it the path turns: what lies before says nothing of the direction.
-            self.before = None
+            self.past = ()
 
     def _arrive(self, found: Equilibrium) -> None:
         self.here = found
@@ -273,7 +278,7 @@ class _Walk:
         """
         log.info("going on by volume control from %.4g", self.here.fraction)
         system, quantity = self.system, Volume(self.system.growth(self.here.fraction))
-        rest = self.before.state if self.before else system.reference_state()
+        rest = self.past[-1].state if self.past else system.reference_state()
         now, then = (system.conjugate(state, quantity.weights) for state in (self.here.state, rest))
         step = 0.5 * abs(now - then) or 0.05 * abs(now)
         if step == 0.0:
@@ -291,7 +296,7 @@ class _Walk:
                     return self._attempt(target, found.state)
                 except NotConvergedError:
                     return None
-            self.before, self.here = previous, found
+            self.past, self.here = (*self.past, previous)[-2:], found
             previous = found
         return None
 
@@ -344,17 +349,19 @@ class _Walk:
         return found
 
     def _predicted(self, aim: float) -> State:
-        """Extrapolate the last two equilibria along a straight line, unless that would turn an element inside out.
+        """Extrapolate the last equilibria, unless that would turn an element inside out.
 
         It ends where surfaces would pass into each other too far.
         """
         here = self.here
-        if self.before is None:
+        if not self.past:
             return here.state
-        reach = (aim - here.fraction) / (here.fraction - self.before.fraction)
-        reach = min(reach, 2.0)
-        reach *= self.system.longest_step(here.state, reach * (here.state.u - self.before.state.u))
-        predicted = here.state.beyond(self.before.state, reach)
+        aim = min(aim, here.fraction + LONGEST_REACH * (here.fraction - self.past[-1].fraction))
+        known = (*self.past, here)
+        predicted = extrapolated([e.fraction for e in known], [e.state for e in known], aim)
+        part = self.system.longest_step(here.state, predicted.u - here.state.u)
+        if part < 1.0:
+            predicted = predicted.beyond(here.state, part - 1.0)
         return predicted if self.system.worst_jacobian(predicted.u)[0] > 0.0 else here.state
 
 

@@ -18,6 +18,7 @@ from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.linear import LinearSolver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
+from turgor.solver.prediction import extrapolated
 
 log = logger("solver")
 
@@ -91,6 +92,7 @@ class VolumeWalk:
         self.quantity = quantity or Volume()
         self.here = start if start.compliance is not None else self.with_compliance(start)
         self.before: Equilibrium | None = None
+        self._earlier: Equilibrium | None = None
         self.step = self.first_step = step
         self.failure: NotConvergedError | None = None
 
@@ -114,9 +116,13 @@ class VolumeWalk:
                 continue
             if found.iterations <= EASY:
                 self.step = max(self.step, 1.4 * (aim - now), key=abs)
-            self.before, self.here = self.here, found
+            self._earlier, self.before, self.here = self.before, self.here, found
             return found
         return None
+
+    def stand_at(self, here: Equilibrium, before: Equilibrium | None) -> None:
+        """Go on from an equilibrium, predicting from it and another one."""
+        self._earlier, self.before, self.here = None, before, here
 
     def measure(self, equilibrium: Equilibrium) -> float:
         """Return the quantity at an equilibrium."""
@@ -124,7 +130,7 @@ class VolumeWalk:
         return self.quantity.value(conjugate, equilibrium.fraction)
 
     def at(self, value: float) -> Equilibrium:
-        """Return the equilibrium at a given value of the quantity, predicted from the last two.
+        """Return the equilibrium at a given value of the quantity, predicted from the last ones.
 
         Raises
         ------
@@ -134,9 +140,10 @@ class VolumeWalk:
         here, before = self.here, self.before
         guess, fraction = here.state, here.fraction
         if before is not None:
-            last = self.measure(here)
-            reach = (value - last) / (last - self.measure(before))
-            predicted = here.state.beyond(before.state, reach)
+            known = [e for e in (self._earlier, before, here) if e is not None]
+            places = [self.measure(e) for e in known]
+            reach = (value - places[-1]) / (places[-1] - places[-2])
+            predicted = extrapolated(places, [e.state for e in known], value)
             if self.system.worst_jacobian(predicted.u)[0] > 0.0:
                 guess = predicted
                 fraction += reach * (here.fraction - before.fraction)
@@ -156,7 +163,7 @@ class VolumeWalk:
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1]))[2]
         for _ in range(30):
             (q0, s0, e0), (q1, s1, e1) = ends
-            self.before, self.here = e0, e1
+            self.stand_at(e1, e0)
             aim = q0 - s0 * (q1 - q0) / (s1 - s0)
             aim = min(max(aim, q0 + 0.05 * (q1 - q0)), q1 - 0.05 * (q1 - q0))
             best = self.at(aim)
