@@ -13,6 +13,7 @@ BAD = Path(__file__).parent / "bad"
 
 CASES: dict[str, tuple[str, ...]] = {
     "a-list.yaml": ("no keys",),
+    "barrier-with-friction.yaml": ("contact.friction", "barrier knows no friction", "method: penalty"),
     "bare-constant.yaml": ("materials.body.constants.C10", "a unit is missing", "0.05"),
     "bare-number.yaml": ("mesh.size", "a unit is missing", "found 6", "'3 mm'"),
     "billion-laughs.yaml": ("line 2", "alias"),

@@ -14,7 +14,7 @@ OPTIONAL: dict[str, str] = {
     "vtk": "pictures of the deformed body",
     "pyvista": "pictures of the deformed body",
     "gmsh": "meshing",
-    "ipctk": "the check that no surfaces intersect",
+    "ipctk": "contact by the barrier method, and the check that no surfaces intersect",
 }
 """Package name and what needs it."""
 

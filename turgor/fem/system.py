@@ -12,6 +12,7 @@ from turgor.common.errors import InputError
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints
+from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.spec import ContactCase, RigidContact, make_contact
 from turgor.fem.contact.term import Contact, Touch
@@ -233,6 +234,11 @@ class System:
     def rubs(self) -> bool:
         """Whether there is friction."""
         return any(contact.friction > 0.0 for contact in self.contacts)
+
+    @property
+    def has_barrier(self) -> bool:
+        """Whether a barrier keeps surfaces apart."""
+        return any(isinstance(contact, Barrier) for contact in self.contacts)
 
     def gripped(self, state: State, *, dragged: bool) -> State:
         """Return the state in which friction goes by the normal forces and places that it shows.

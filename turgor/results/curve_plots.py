@@ -18,6 +18,7 @@ _COLUMNS = 2
 _KINDS = (
     ("Contact", "contact_", "_force_N", "Force / N"),
     ("Contact", "contact_", "_overlap_per_wall", "Overlap / wall"),
+    ("Contact", "contact_", "_gap_per_wall", "Smallest gap / wall"),
     ("Contact", "contact_", "_area_mm2", "Area in contact / mm²"),
     ("Fibres", "fibre_", "largest_tension_N", "Largest tension / N"),
     ("Fibres", "fibre_", "largest_strain", "Largest strain"),

@@ -202,6 +202,7 @@ class _Arc:
         guess, aim = here.state, here.fraction + length * float(self.direction[1])
         if before is not None:
             reach = length / float(np.linalg.norm(self._way(here, before)))
+            reach *= walk.system.longest_step(here.state, reach * (here.state.u - before.state.u))
             predicted = here.state.beyond(before.state, reach)
             if walk.system.worst_jacobian(predicted.u)[0] > 0.0:
                 guess, aim = predicted, here.fraction + reach * (here.fraction - before.fraction)

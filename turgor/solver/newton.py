@@ -105,6 +105,13 @@ SMALLEST_DAMPING = 1 / 32
 TRIALS = 5
 """Lengths of a step that a line search tries."""
 
+LESS = 0.9
+"""With a barrier, a step after which forces are less out of balance by this factor is taken even if the merit rises.
+
+Near its equilibria the tangent need not be definite, and the merit would shorten every step (two boxes that meet took
+60 iterations in place of 22).
+"""
+
 ROUNDING = 1e-9
 """Part of the merit by which it may rise through rounding."""
 
@@ -284,13 +291,23 @@ def _advanced(system: System, state: State, du: Floats, residuals: list[float], 
 
 
 def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float) -> float:
-    """Return the longest of a few ever shorter parts of the step with which the merit falls, or else the best."""
+    """Return the longest of a few ever shorter parts of the step with which the merit falls, or else the best.
+
+    With a barrier it is the longest too where the forces are less out of balance after it.
+    """
     start = system.merit(state, lagged)
     parts, merits = [longest], [system.merit(state.moved(longest * du), lagged)]
     while merits[-1] > start + ROUNDING * abs(start) and len(parts) < TRIALS:
         parts.append(0.5 * parts[-1])
         merits.append(system.merit(state.moved(parts[-1] * du), lagged))
-    return parts[int(np.argmin(merits))]
+    best = parts[int(np.argmin(merits))]
+    return longest if best < longest and system.has_barrier and _balances(system, state, longest * du) else best
+
+
+def _balances(system: System, state: State, du: Floats) -> bool:
+    """Whether the forces are less out of balance after a step."""
+    before, after = (np.linalg.norm(system.free_part(system.forces(at)[0])) for at in (state, state.moved(du)))
+    return bool(after < LESS * before)
 
 
 def _accepted(

@@ -144,6 +144,9 @@ class VolumeWalk:
             places = [self.measure(e) for e in known]
             reach = (value - places[-1]) / (places[-1] - places[-2])
             predicted = extrapolated(places, [e.state for e in known], value)
+            part = self.system.longest_step(here.state, predicted.u - here.state.u)
+            if part < 1.0:  # surfaces would meet on the way
+                predicted, reach = predicted.beyond(here.state, part - 1.0), part * reach
             if self.system.worst_jacobian(predicted.u)[0] > 0.0:
                 guess = predicted
                 fraction += reach * (here.fraction - before.fraction)

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from turgor.common.units import Length, PositiveLength
 from turgor.fem.contact.spec import ContactCase as Contact
-from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
+from turgor.fem.contact.spec import Method, PairContact, RigidContact, SelfContact
 from turgor.fem.rigid import Box, Cylinder, Plane, RigidBody, Sphere
 from turgor.geometry.space import Place
 from turgor.study.boundary import Direction
@@ -25,10 +25,10 @@ class _RigidCase(StrictModel):
     move: tuple[Length, Length, Length] | None = Field(default=None, description="displacement at the full load")
     friction: Friction | None = Field(default=None, description="coefficient; left out, that of the contact")
 
-    def build(self, label: str, friction: float) -> RigidContact:
+    def build(self, label: str, friction: float, method: Method) -> RigidContact:
         """Return the contact with this body; `friction` is the coefficient where it has none of its own."""
         own = friction if self.friction is None else self.friction
-        return RigidContact(self.body(), self.surface, self.move, label, own)
+        return RigidContact(self.body(), self.surface, self.move, label, own, method)
 
     def body(self) -> RigidBody:
         """Return the body."""
@@ -108,6 +108,7 @@ class ContactCase(StrictModel):
     pairs: tuple[tuple[str, str], ...] = Field(default=(), description="two surfaces each")
     bodies: tuple[RigidCase, ...] = Field(default=(), description="rigid bodies")
     friction: Friction = Field(default=0.0, description="coefficient of friction wherever something touches")
+    method: Method = Field(default="penalty", description="on overlaps, or a barrier that lets nothing overlap")
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
@@ -117,7 +118,20 @@ class ContactCase(StrictModel):
         twice = next((label for label in labels if labels.count(label) > 1), None)
         if twice is not None:
             raise invalid("two bodies have this name", key="bodies", value=twice, expected="a name of its own for each")
+        if self.method == "barrier":
+            self._check_barrier()
         return self
+
+    def _check_barrier(self) -> None:
+        """Refuse what the barrier does not know."""
+        rubs = [f"bodies.{k}.friction" for k, body in enumerate(self.bodies) if body.friction]
+        if self.friction > 0.0 or rubs:
+            key = "friction" if self.friction > 0.0 else rubs[0]
+            raise invalid("the barrier knows no friction", key=key, expected="no friction, or method: penalty")
+        moving = [f"bodies.{k}.move" for k, body in enumerate(self.bodies) if body.move is not None]
+        if moving:
+            expected = "a body that stands still, or method: penalty"
+            raise invalid("the barrier knows no rigid body that moves", key=moving[0], expected=expected)
 
     @property
     def labels(self) -> list[str]:
@@ -126,10 +140,10 @@ class ContactCase(StrictModel):
 
     def build(self) -> list[Contact]:
         """Return the contacts."""
-        own = [SelfContact(self.friction)] if self.self else []
-        pairs = [PairContact(*names, self.friction) for names in self.pairs]
+        own = [SelfContact(self.friction, self.method)] if self.self else []
+        pairs = [PairContact(*names, self.friction, self.method) for names in self.pairs]
         labelled = zip(self.bodies, self.labels, strict=True)
-        return [*own, *pairs, *(body.build(label, self.friction) for body, label in labelled)]
+        return [*own, *pairs, *(body.build(label, self.friction, self.method) for body, label in labelled)]
 
 
 def _shorthand(value: object) -> object:

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from turgor.fem.contact.friction import WIDTH
-from turgor.fem.contact.intersection import IntersectionCheck
-from turgor.fem.contact.surfaces import SurfaceContact
 from turgor.fem.contact.term import Contact
 from turgor.fem.fields import von_mises
 from turgor.fem.interface import Interface, interfaces
@@ -124,7 +122,8 @@ def standing(
     Returns
     -------
     dict
-        ``contact``: by its name, area, overlap (also in parts of the wall behind it) and what a rigid body feels;
+        ``contact``: by its name, area, overlap or by a barrier the smallest gap (also in parts of the wall behind
+        it; ``None`` beyond the barrier's reach), and what a rigid body feels;
         of the body with itself, where the IPC Toolkit is installed, whether more than 1 % of the wall overlaps;
         ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction;
         ``supports``: by its surface, force and torque on the body.
@@ -146,13 +145,13 @@ def standing(
 
 def _touch(contact: Contact, state: State) -> dict[str, Any]:
     touch = contact.touch(state)
-    facts: dict[str, Any] = {
-        "area_mm2": touch.area,
-        "overlap_mm": touch.overlap,
-        "overlap_per_wall": touch.overlap_per_wall,
-    }
-    if isinstance(contact, SurfaceContact) and IntersectionCheck.is_possible():
-        facts["surfaces_intersect"] = contact.intersection_check.intersects(state.u)
+    facts: dict[str, Any] = {"area_mm2": touch.area}
+    if touch.barrier:
+        facts |= {"gap_mm": touch.gap, "gap_per_wall": touch.gap_per_wall}
+    else:
+        facts |= {"overlap_mm": touch.overlap, "overlap_per_wall": touch.overlap_per_wall}
+    if (intersect := contact.intersects(state)) is not None:
+        facts["surfaces_intersect"] = intersect
     if touch.force is not None and touch.torque is not None:
         facts |= {"force_N": list(touch.force), "torque_N_mm": list(touch.torque)}
     return facts

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.skin import STIFFNESS, Skin
-from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch, Triple, resultants
 from turgor.fem.pattern import packed_size
 from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
@@ -169,6 +169,10 @@ class Obstacle:
             torque=torque,
         )
 
+    def intersects(self, state: State) -> None:
+        """Say nothing: there is no independent look at overlaps with a rigid body."""
+        del state
+
     def gripped(self, state: State, *, dragged: bool) -> Floats:
         """Return what friction remembers; see :class:`turgor.fem.contact.term.Contact`."""
         rows = grips_in(state, self._number)
@@ -191,7 +195,7 @@ class Obstacle:
         stiffness = self._normal_stiffness(state)[face, quad]
         return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
 
-    def _resultants(self, state: State) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    def _resultants(self, state: State) -> tuple[Triple, Triple]:
         """Return force and torque on the body, of three components also in a plane model."""
         push = self._pushes(state)
         rows = grips_in(state, self._number)
@@ -199,14 +203,7 @@ class Obstacle:
         np.add.at(push, (face, quad), self._rubbing(state).drag)
         arm = self._places(state.u) - (self.body.reference_point + self._shift(state.loads))
         push, arm = (np.pad(v.reshape(-1, v.shape[2]), ((0, 0), (0, 3 - v.shape[2]))) for v in (push, arm))
-        force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
-        if self._turned:
-            force[0] = torque[2] = 0.0
-        return (float(force[0]), float(force[1]), float(force[2])), (
-            float(torque[0]),
-            float(torque[1]),
-            float(torque[2]),
-        )
+        return resultants(push, arm, turned=self._turned)
 
     def _shift(self, loads: Floats) -> Floats:
         return self.motion * (loads[self.channel] if self.moves else 0.0)

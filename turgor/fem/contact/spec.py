@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.fem.contact.barrier import REACH, Barrier
+from turgor.fem.contact.hull import hull
 from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.surfaces import SurfaceContact
@@ -23,6 +26,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
+Method = Literal["penalty", "barrier"]
+"""A penalty on overlaps, or a barrier that keeps surfaces apart (IPC Toolkit)."""
+
+PARTS_OF_REACH = 0.25
+"""The pieces of a round rigid body may be off it by this part of the barrier's reach."""
+
+
 @dataclass(frozen=True)
 class SelfContact:
     """Any part of the skin may meet any other; which ones do is found on the way.
@@ -31,12 +41,15 @@ class SelfContact:
     ----------
     friction
         Coefficient of friction, 0 or more.
+    method
+        ``penalty`` on overlaps or ``barrier`` before them.
     """
 
     friction: float = 0.0
+    method: Method = "penalty"
 
     def __post_init__(self) -> None:
-        _check_friction(self.friction)
+        _check(self)
 
     @property
     def name(self) -> str:
@@ -46,14 +59,15 @@ class SelfContact:
 
 @dataclass(frozen=True)
 class PairContact:
-    """Two surfaces of the mesh may meet each other, with a coefficient of friction."""
+    """Two surfaces of the mesh may meet each other; friction and method as for :class:`SelfContact`."""
 
     first: str
     second: str
     friction: float = 0.0
+    method: Method = "penalty"
 
     def __post_init__(self) -> None:
-        _check_friction(self.friction)
+        _check(self)
 
     @property
     def name(self) -> str:
@@ -77,6 +91,8 @@ class RigidContact:
         What the body is called in results.
     friction
         Coefficient of friction, 0 or more.
+    method
+        ``penalty`` on overlaps or ``barrier`` before them.
     """
 
     body: RigidBody
@@ -84,9 +100,10 @@ class RigidContact:
     motion: Vector | None = None
     label: str = "body"
     friction: float = 0.0
+    method: Method = "penalty"
 
     def __post_init__(self) -> None:
-        _check_friction(self.friction)
+        _check(self)
 
     @property
     def name(self) -> str:
@@ -130,24 +147,53 @@ def make_contact(
     """
     if mesh.cell_type == "hex27":
         raise InputError("contact works on meshes of tetrahedra or plane cells", key="contact", value=mesh.cell_type)
+    barrier = case.method == "barrier"
     if isinstance(case, RigidContact):
         faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
         body, motion = _fitting(case, mesh, section)
         turned = isinstance(section, Axisymmetric)
         skin = Skin(mesh, faces, materials, pressure, section)
+        if barrier:
+            error = PARTS_OF_REACH * REACH * float(skin.wall.min())
+            around = hull(body, mesh.points, error, f"contact.{case.name}")
+            return Barrier(skin, None, case.name, section, around)
         return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number)
     if isinstance(case, PairContact):
         first, second = mesh.surface(case.first), mesh.surface(case.second)
         group = np.repeat(np.array([0, 1], np.int32), [len(first), len(second)])
         skin = Skin(mesh, np.vstack([first, second]), materials, pressure, section)
-        return SurfaceContact(skin, group, case.name, case.friction, number)
-    skin = Skin(mesh, _whole(mesh, section), materials, pressure, section)
-    return SurfaceContact(skin, None, case.name, case.friction, number)
+    else:
+        group, skin = None, Skin(mesh, _whole(mesh, section), materials, pressure, section)
+    if barrier:
+        return Barrier(skin, group, case.name, section)
+    return SurfaceContact(skin, group, case.name, case.friction, number)
 
 
-def _check_friction(friction: float) -> None:
-    if not 0.0 <= friction < np.inf:
-        raise InputError("a coefficient of friction is not negative", key="contact.friction", value=friction)
+def _check(case: ContactCase) -> None:
+    """Refuse what a contact cannot be asked for."""
+    if not 0.0 <= case.friction < np.inf:
+        raise InputError("a coefficient of friction is not negative", key="contact.friction", value=case.friction)
+    if case.method not in get_args(Method):
+        raise InputError(
+            "there is no such method of contact",
+            key="contact.method",
+            value=case.method,
+            expected=" or ".join(get_args(Method)),
+        )
+    if case.method == "barrier" and case.friction > 0.0:
+        raise InputError(
+            "the barrier knows no friction",
+            key="contact.friction",
+            value=case.friction,
+            expected="0, or method: penalty",
+        )
+    if case.method == "barrier" and isinstance(case, RigidContact) and case.motion is not None:
+        raise InputError(
+            "the barrier knows no rigid body that moves",
+            key=f"contact.{case.name}.motion",
+            value=case.motion,
+            expected="a body that stands still, or method: penalty",
+        )
 
 
 def _whole(mesh: Mesh, section: Section | None) -> Ints:

@@ -181,6 +181,10 @@ class SurfaceContact:
             overlap_per_wall=float((-pairs.gap / wall).max(initial=0.0)),
         )
 
+    def intersects(self, state: State) -> bool | None:
+        """Say whether more overlaps than is allowed; ``None`` where the IPC Toolkit is not installed."""
+        return self.intersection_check.intersects(state.u) if IntersectionCheck.is_possible() else None
+
     def gripped(self, state: State, *, dragged: bool) -> Floats:
         """Return what friction remembers; see :class:`turgor.fem.contact.term.Contact`.
 

@@ -13,6 +13,7 @@ from turgor.fem.term import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Triple = tuple[float, float, float]
 
 LARGEST_OVERLAP = 0.01
 """An equilibrium counts only where no overlap is more than this part of the wall behind it."""
@@ -40,6 +41,11 @@ class Touch:
     force, torque
         What a rigid body feels, N and N mm, the torque about its reference point; ``None`` for contact of the
         body with itself.
+    gap, gap_per_wall
+        By a barrier nothing ever overlaps: the smallest gap, mm, and over the thinnest wall; ``None`` by a penalty,
+        and where nothing is within the barrier's reach.
+    barrier
+        Whether a barrier keeps the surfaces apart.
     """
 
     name: str
@@ -48,6 +54,9 @@ class Touch:
     overlap_per_wall: float
     force: tuple[float, float, float] | None = None
     torque: tuple[float, float, float] | None = None
+    gap: float | None = None
+    gap_per_wall: float | None = None
+    barrier: bool = False
 
 
 class Contact(Term, Protocol):
@@ -72,9 +81,24 @@ class Contact(Term, Protocol):
         """Return how the contact stands."""
         ...
 
+    def intersects(self, state: State) -> bool | None:
+        """Say whether surfaces intersect, by an independent look where there is one and it is installed."""
+        ...
+
     def gripped(self, state: State, *, dragged: bool) -> Floats:
         """Return what friction remembers if it goes by the forces, normals and places of this state.
 
         With `dragged`, what slides has dragged along what it holds on to: a new step begins.
         """
         ...
+
+
+def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Triple]:
+    """Return force and torque of the pushes ``(n, 3)`` with arms ``(n, 3)``.
+
+    `turned`: the model is a body of revolution, around whose axis y all forces across it cancel.
+    """
+    force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
+    if turned:
+        force[0] = torque[2] = 0.0
+    return (float(force[0]), float(force[1]), float(force[2])), (float(torque[0]), float(torque[1]), float(torque[2]))
