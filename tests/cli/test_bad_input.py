@@ -109,6 +109,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "sheet-between-unknown.yaml": ("sheets.0.between.1", "'base'", "body"),
     "sheet-nowhere.yaml": ("sheets.0", "either surface or between"),
     "sheet-poisson-1.yaml": ("sheets.0.poisson", "1.0", "less than 1"),
+    "spring-of-wrong-unit.yaml": ("contact.bodies.0.spring.stiffness", "not a unit of stiffness"),
     "sphere-of-bare-radius.yaml": ("contact.bodies.0.radius", "a unit is missing"),
     "step-without-file.yaml": ("geometry.file", "nowhere.step", "STEP file"),
     "step-without-mount.yaml": ("geometry.mount",),

@@ -18,6 +18,7 @@ from turgor.common.errors import InputError, MissingPackageError
 from turgor.mesh.mesh import Mesh
 from turgor.results import animation, plots
 from turgor.results import report as report_module
+from turgor.results.curve_plots import over_displacement
 from turgor.results.pictures import Pictures
 from turgor.results.report import number, report
 from turgor.results.store import RunStore
@@ -245,3 +246,15 @@ def test_frames_keep_to_their_budget() -> None:
 )
 def test_numbers_are_written_as_people_do(value: object, text: str) -> None:
     assert number(value) == text
+
+
+def test_force_is_drawn_over_the_displacement_of_a_body_that_gives_way():
+    rows = [
+        {"step": 0, "stable": True, "contact_scale_force_N": 0.0, "contact_scale_displacement_mm": 0.0},
+        {"step": 1, "stable": False, "contact_scale_force_N": 0.2, "contact_scale_displacement_mm": 0.4},
+    ]
+    figure = over_displacement([{"step": -1}, *rows])
+    assert list(figure.data[0].x) == [0.0, 0.0, 0.4]
+    assert list(figure.data[0].y) == [0.0, 0.0, 0.2]
+    assert figure.data[0].marker.symbol[2] == "circle-open"
+    assert over_displacement([{"step": 0, "contact_scale_force_N": 0.2}]) is None  # a body that stands still

@@ -204,6 +204,24 @@ def test_friction_is_remembered_where_a_run_is_resumed(small_tube: Path, tmp_pat
     assert resumed.summary["contact"]["table"]["force_N"][0] == pytest.approx(push, rel=1e-3)
 
 
+@pytest.mark.usefixtures("unreported")
+def test_a_body_on_a_spring_is_a_dynamometer_also_where_a_run_is_resumed(small_tube: Path, tmp_path: Path) -> None:
+    sprung = TABLE.replace("}", ", spring: {stiffness: 0.3 N/mm, direction: [0, 0, 1]}}")
+    case = load_case(small_tube, [f"contact.bodies=[{sprung}]", "loads.0.value=30 kPa"])
+    done = run(case, tmp_path / "whole")
+    touch = done.summary["contact"]["table"]
+    assert touch["force_N"][2] > 0.1
+    assert touch["force_N"][2] == pytest.approx(0.3 * touch["displacement_mm"][2], rel=1e-6)
+    with (done.folder / "history.csv").open() as file:
+        last = list(csv.DictReader(file))[-1]
+    moved, force = (float(last[f"contact_table_{key}"]) for key in ("displacement_mm", "force_N"))
+    assert force == pytest.approx(0.3 * moved, rel=1e-6)
+    with pytest.raises(KeyboardInterrupt):
+        run(case, tmp_path / "parts", progress=Watch(interrupt_after=3))
+    resumed = run(case, tmp_path / "parts", resume=True)
+    assert resumed.summary["contact"]["table"]["force_N"][2] == pytest.approx(touch["force_N"][2], rel=1e-5)
+
+
 FIT = "materials.body={fit: 'soft rubber.csv', models: [yeoh-1, neo-hookean], poisson: 0.499}"
 
 

@@ -27,6 +27,7 @@ INTERNAL_UNITS: dict[str, str] = {
     "pressure": "MPa",
     "compliance": "1/MPa",
     "force": "N",
+    "stiffness": "N/mm",
     "foundation": "N/mm^3",
     "density": "t/mm^3",
     "acceleration": "mm/s^2",
@@ -42,6 +43,7 @@ EXAMPLES: dict[str, str] = {
     "pressure": "12 psi",
     "compliance": "30 1/MPa",
     "force": "1.5 N",
+    "stiffness": "0.5 N/mm",
     "foundation": "0.01 N/mm^3",
     "density": "1070 kg/m^3",
     "acceleration": "9.81 m/s^2",
@@ -174,6 +176,7 @@ PositiveArea = quantity_type("area", 0.0, exclusive=True)
 Pressure = quantity_type("pressure")
 PositivePressure = quantity_type("pressure", 0.0, exclusive=True)
 Force = quantity_type("force")
+Stiffness = quantity_type("stiffness", 0.0, exclusive=True)
 Foundation = quantity_type("foundation", 0.0, exclusive=True)
 Density = quantity_type("density", 0.0, exclusive=True)
 Acceleration = quantity_type("acceleration")

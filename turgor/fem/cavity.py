@@ -41,28 +41,32 @@ class AirPressure(Unlagged):
 
     def energy(self, state: State) -> float:
         """Return −p V, N mm."""
-        return -float(state.loads[self.channel]) * self._enclosed.volume(self.points + state.u)
+        return -float(state.loads[self.channel]) * self._enclosed.volume(self._places(state.u))
 
     def force(self, state: State, out: Floats) -> None:
         """Add −p ∂V/∂u, N."""
         pressure = state.loads[self.channel]
         if pressure != 0.0:
-            add_at_nodes(self.nodes, -pressure * self._enclosed.gradient(self.points + state.u), out)
+            add_at_nodes(self.nodes, -pressure * self._enclosed.gradient(self._places(state.u)), out)
 
     def conjugate(self, state: State) -> float:
         """Return V, mm³."""
-        return self._enclosed.volume(self.points + state.u)
+        return self._enclosed.volume(self._places(state.u))
 
     def load_gradient(self, state: State, out: Floats) -> None:
         """Add −∂V/∂u, mm²."""
-        add_at_nodes(self.nodes, -self._enclosed.gradient(self.points + state.u), out)
+        add_at_nodes(self.nodes, -self._enclosed.gradient(self._places(state.u)), out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill −p ∂²V/∂u², N/mm."""
         del lagged
-        hessian = self._enclosed.hessian(self.points + state.u)
+        hessian = self._enclosed.hessian(self._places(state.u))
         hessian *= -state.loads[self.channel]
         pack_symmetric(hessian, out)
+
+    def _places(self, u: Floats) -> Floats:
+        """Return where the nodes are; what comes behind them in `u` are rigid bodies."""
+        return np.asarray(self.points + u[: len(self.points)])
 
 
 class Cavity(AirPressure):
@@ -111,7 +115,7 @@ class Cavity(AirPressure):
 
     def volume(self, u: Floats) -> float:
         """Return the volume that wall and caps enclose at displacement `u`, mm³."""
-        x = self.points + u
+        x = self._places(u)
         return self._enclosed.volume(x) + sum(cap._enclosed.volume(x) for cap in self.caps)
 
 

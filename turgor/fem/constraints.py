@@ -102,6 +102,22 @@ def compile_constraints(
     )
 
 
+def with_bodies(constraints: Constraints, directions: Iterable[Floats]) -> Constraints:
+    """Return the constraints with a row more for each rigid body that only moves along a direction ``(d,)``."""
+    frames = [_completed(direction[None] / np.linalg.norm(direction))[::-1] for direction in directions]
+    if not frames:
+        return constraints
+    n, d = constraints.fixed.shape
+    held = np.ones((len(frames), d), bool)
+    held[:, -1] = False
+    return Constraints(
+        np.vstack([constraints.fixed, held]),
+        np.vstack([constraints.value, np.zeros((len(frames), d))]),
+        np.concatenate([constraints.frame_nodes, n + np.arange(len(frames), dtype=np.int32)]),
+        np.concatenate([constraints.frames, frames]),
+    )
+
+
 def conditions_at_nodes(
     mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed], section: Section | None = None
 ) -> dict[int, list[Condition]]:

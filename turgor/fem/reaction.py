@@ -55,8 +55,8 @@ class Reactions:
         return {name: self._resultants(state, name, force) for name, force in nodal.items()}
 
     def _resultants(self, state: State, name: str, nodal: Floats) -> dict[str, Any]:
-        about, force = self._about[name], in_space(nodal)
-        arm = in_space(self._system.mesh.points + state.u) - about
+        about, force = self._about[name], in_space(self._system.body_part(nodal))
+        arm = in_space(self._system.mesh.points + self._system.body_part(state.u)) - about
         total, torque = force.sum(axis=0), np.cross(arm, force).sum(axis=0)
         if isinstance(self._system.section, Axisymmetric):
             total[0], torque[:] = 0.0, 0.0

@@ -18,7 +18,7 @@ class State:
     Attributes
     ----------
     u
-        Displacement ``(n_points, 3)``, mm.
+        Displacement of the nodes, then of rigid bodies on springs, ``(n_points + n_bodies, d)``, mm.
     lagged
         For each term, the quantities that Newton's iteration treats as unknowns of their own: dilatation and stress of
         every element of a solid, nothing for most terms. At an equilibrium they follow from the displacement; on the

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from turgor.common.errors import InputError
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.cavity import Cavity
-from turgor.fem.constraints import compile_constraints
+from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
-from turgor.fem.contact.obstacle import Obstacle
-from turgor.fem.contact.spec import ContactCase, RigidContact, make_contact
+from turgor.fem.contact.obstacle import BodySpring, Obstacle
+from turgor.fem.contact.spec import ContactCase, RigidContact, make_contact, spring_direction
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -94,6 +94,9 @@ class System:
             for s in springs
         ]
         check_held(mesh, self.constraints, springs, section)
+        self._on_springs = [c for c in contact if isinstance(c, RigidContact) and c.spring is not None]
+        self.constraints = with_bodies(self.constraints, [spring_direction(c, mesh, section) for c in self._on_springs])
+        bodies = [self._spring(case) for case in self._on_springs]
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         caps = [cap for cavity in self.cavities for cap in cavity.caps]
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
@@ -109,12 +112,13 @@ class System:
             *(bed for _, bed in self.beds),
             *dead,
             *embedded,
+            *bodies,
             *self.contacts,
         )
         pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
         self._loaded: tuple[Loaded, ...] = (*self.cavities, *caps, *dead, *pushed)
 
-        self._couplings: list[Ints] = [c.couplings(np.zeros_like(mesh.points)) for c in self.contacts]
+        self._couplings: list[Ints] = [c.couplings(self._rest) for c in self.contacts]
         self._touching: list[tuple[Ints, Floats]] = []
         self.pattern = self._make_pattern()
         self._frames = BlockFrames(self.constraints, [term.nodes for term in self.terms])
@@ -127,7 +131,11 @@ class System:
 
     def reference_state(self) -> State:
         """Return the undeformed state without loads."""
-        return self.consistent(np.zeros_like(self.mesh.points), np.zeros(len(self.loads)))
+        return self.consistent(self._rest, np.zeros(len(self.loads)))
+
+    def body_part(self, field: Floats) -> Floats:
+        """Return the nodes' part ``(n_points, d)`` of a field like ``State.u``: behind it are bodies on springs."""
+        return field[: self.mesh.n_points]
 
     def loads_at(self, fraction: float) -> Floats:
         """Return the loads ``(n_loads,)`` at a load fraction, each along its programme."""
@@ -210,7 +218,7 @@ class System:
         local = self.constraints.to_frames(du)
         product = np.zeros_like(du)
         for k, term in enumerate(self.terms):
-            if term.nodes.shape[1] > 1 and len(term.nodes):
+            if len(term.nodes):
                 block_products(term.nodes, self._block(k), local, product)
         for nodes, packed in self._touching:
             block_products(nodes, packed, local, product)
@@ -222,9 +230,9 @@ class System:
 
     def nodal(self, free: Floats) -> Floats:
         """Return the nodal field ``(n_points, d)`` with the given free components, zero elsewhere."""
-        field = np.zeros(self.mesh.points.size)
+        field = np.zeros(self._rest.size)
         field[self.pattern.free] = free
-        return self.constraints.from_frames(field.reshape(self.mesh.points.shape))
+        return self.constraints.from_frames(field.reshape(self._rest.shape))
 
     def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0, grips: tuple[Floats, ...] = ()) -> State:
         """Return the state of displacement `u` in which nothing lags."""
@@ -297,7 +305,7 @@ class System:
     def _make_pattern(self) -> SparsePattern:
         free = ~self.constraints.fixed.ravel()
         groups = [term.nodes for term in self.terms]
-        return SparsePattern(self.mesh.n_points, self.mesh.dimension, groups, free, self._couplings)
+        return SparsePattern(len(self._rest), self.mesh.dimension, groups, free, self._couplings)
 
     def _touching_blocks(self, contact: Contact, state: State) -> tuple[Ints, Floats]:
         nodes, packed = contact.blocks(state, state.lagged[self.terms.index(contact)])
@@ -307,7 +315,21 @@ class System:
     def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
         pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
         channel = self.loads.index(case) if isinstance(case, RigidContact) and case.motion is not None else None
-        return make_contact(self.mesh, materials, case, pressure, channel, self.section, number)
+        return make_contact(self.mesh, materials, case, pressure, channel, self.section, number, self._row(case))
+
+    @property
+    def _rest(self) -> Floats:
+        """No displacement, ``(n_points + n_bodies, d)``: a row for each node, then one for each body on a spring."""
+        return np.zeros_like(self.constraints.value)
+
+    def _row(self, case: ContactCase) -> int | None:
+        return self.mesh.n_points + self._on_springs.index(case) if case in self._on_springs else None
+
+    def _spring(self, case: RigidContact) -> BodySpring:
+        row = self._row(case)
+        assert row is not None
+        assert case.spring is not None
+        return BodySpring(row, case.spring.stiffness, self.mesh.dimension)
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         mesh = self.mesh
@@ -321,7 +343,7 @@ class System:
         return SpreadFibres(self.mesh, solid, family)
 
     def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
-        nodal = np.zeros_like(self.mesh.points)
+        nodal = self._rest
         if isinstance(load, Gravity):
             acceleration = in_section(load.acceleration, self.mesh, self.section, "gravity", total=True)
             for solid in self.solids:

@@ -19,6 +19,7 @@ _KINDS = (
     ("Contact", "contact_", "_force_N", "Force / N"),
     ("Contact", "contact_", "_overlap_per_wall", "Overlap / wall"),
     ("Contact", "contact_", "_gap_per_wall", "Smallest gap / wall"),
+    ("Contact", "contact_", "_displacement_mm", "Displacement of the body / mm"),
     ("Contact", "contact_", "_area_mm2", "Area in contact / mm²"),
     ("Fibres", "fibre_", "largest_tension_N", "Largest tension / N"),
     ("Fibres", "fibre_", "largest_strain", "Largest strain"),
@@ -66,6 +67,31 @@ def over_load(history: Sequence[Row], axes: Mapping[str, Sequence[tuple[str, str
         figure.update_xaxes(title_text=load.title, **at)
         figure.update_yaxes(title_text=title, **at)
     finish(figure, height=320 * rows)
+    return figure
+
+
+def over_displacement(history: Sequence[Row]) -> go.Figure | None:
+    """Return the force on each rigid body that moves or is on a spring over its displacement; ``None``: there is none.
+
+    Parameters
+    ----------
+    history
+        Rows of the history, at least one.
+    """
+    ends = ("_displacement_mm", "_force_N")
+    names = [key.removesuffix(ends[0]) for key in history[-1] if key.startswith("contact_") and key.endswith(ends[0])]
+    if not names:
+        return None
+    figure = go.Figure()
+    for name, color in zip(names[:_MOST_LINES], itertools.cycle(SERIES)):
+        # The row of rest knows nothing of contact: nothing has moved there.
+        moved, force = ([entry.get(name + end, 0.0) for entry in history] for end in ends)
+        symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]
+        label = name.removeprefix("contact_")
+        figure.add_trace(line_trace(moved, force, symbols, color, name=label, legend=len(names) > 1))
+    figure.update_xaxes(title_text="Displacement of the body / mm")
+    figure.update_yaxes(title_text="Force / N")
+    finish(figure, height=360)
     return figure
 
 

@@ -88,7 +88,7 @@ def _volumes(volumes: Mapping[str, float]) -> Row:
 
 
 def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
-    """Area, overlap and force of each contact; of the force on a rigid body also its size."""
+    """Area, overlap and force of each contact; of force on and displacement of a rigid body also the size."""
     columns: Row = {}
     for name, facts in standing.items():
         for key, value in facts.items():
@@ -97,7 +97,8 @@ def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
                 parts = {
                     f"contact_{name}_{quantity}_{axis}_{unit}": float(x) for axis, x in zip("xyz", value, strict=True)
                 }
-                columns |= {**parts, f"contact_{name}_{key}": math.hypot(*value)} if quantity == "force" else parts
+                size = {f"contact_{name}_{key}": math.hypot(*value)} if quantity in ("force", "displacement") else {}
+                columns |= {**parts, **size}
             elif value is not None:
                 columns[f"contact_{name}_{key}"] = float(value)
     return columns

@@ -155,6 +155,8 @@ def _states_section(store: RunStore) -> dict[str, Any]:
 def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, str]]:
     """Figures that only some runs have: what contact and fibres carry, and the measures that are curves."""
     figures = [(title, curve_plots.over_load(history, keys)) for title, keys in curve_plots.groups(history).items()]
+    dynamometers = curve_plots.over_displacement(history)
+    figures += [] if dynamometers is None else [("Force over displacement", dynamometers)]
     figures += [(title.replace("-", " ").capitalize(), curve_plots.line(rows)) for title, rows in store.curves.items()]
     return [
         {"id": f"extra-{number}", "title": title, "figure": _as_json(figure)}

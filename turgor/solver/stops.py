@@ -73,7 +73,7 @@ def at_limit(
 ) -> StoppedShortError:
     """Return the error for a path that ends at a limit of its load."""
     facts = load_facts(system, limit.equilibrium)
-    worst = int(np.argmax(np.linalg.norm(limit.mode, axis=1)))
+    worst = int(np.argmax(np.linalg.norm(system.body_part(limit.mode), axis=1)))
     facts["mode_largest_at_mm"] = [round(float(x), 3) for x in system.mesh.points[worst]]
     # On the way down the pressures have a minimum, and what snaps back shrinks.
     falls = bool(np.sum(limit.equilibrium.state.loads * system.growth(limit.equilibrium.fraction)) < 0.0)

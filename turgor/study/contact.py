@@ -6,9 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from turgor.common.units import Length, PositiveLength
+from turgor.common.units import Length, PositiveLength, Stiffness
 from turgor.fem.contact.spec import ContactCase as Contact
-from turgor.fem.contact.spec import Method, PairContact, RigidContact, SelfContact
+from turgor.fem.contact.spec import Method, PairContact, RigidContact, SelfContact, Spring
 from turgor.fem.rigid import Box, Cylinder, Plane, RigidBody, Sphere
 from turgor.geometry.space import Place
 from turgor.study.boundary import Direction
@@ -17,18 +17,33 @@ from turgor.study.validation import StrictModel, invalid
 Friction = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
+class SpringCase(StrictModel):
+    """What a rigid body is on: it moves along one direction, against a stiffness."""
+
+    stiffness: Stiffness
+    direction: Direction
+
+    def build(self) -> Spring:
+        """Return the spring."""
+        return Spring(self.stiffness, self.direction)
+
+
 class _RigidCase(StrictModel):
     """What all rigid bodies share: which surface may meet them, and how they move."""
 
     name: str | None = Field(default=None, min_length=1, description="in results; left out, the body's type")
     surface: str | None = Field(default=None, description="what may meet the body; left out, the whole skin")
-    move: tuple[Length, Length, Length] | None = Field(default=None, description="displacement at the full load")
+    move: tuple[Length, Length, Length] | None = Field(
+        default=None, description="displacement at the full load, on a spring that of its far end"
+    )
+    spring: SpringCase | None = Field(default=None, description="left out, the body does not give way")
     friction: Friction | None = Field(default=None, description="coefficient; left out, that of the contact")
 
     def build(self, label: str, friction: float, method: Method) -> RigidContact:
         """Return the contact with this body; `friction` is the coefficient where it has none of its own."""
         own = friction if self.friction is None else self.friction
-        return RigidContact(self.body(), self.surface, self.move, label, own, method)
+        spring = None if self.spring is None else self.spring.build()
+        return RigidContact(self.body(), self.surface, self.move, label, own, method, spring)
 
     def body(self) -> RigidBody:
         """Return the body."""
@@ -129,6 +144,7 @@ class ContactCase(StrictModel):
             key = "friction" if self.friction > 0.0 else rubs[0]
             raise invalid("the barrier knows no friction", key=key, expected="no friction, or method: penalty")
         moving = [f"bodies.{k}.move" for k, body in enumerate(self.bodies) if body.move is not None]
+        moving += [f"bodies.{k}.spring" for k, body in enumerate(self.bodies) if body.spring is not None]
         if moving:
             expected = "a body that stands still, or method: penalty"
             raise invalid("the barrier knows no rigid body that moves", key=moving[0], expected=expected)

@@ -56,7 +56,7 @@ def to_record(
         index=index,
         fraction=fraction,
         loads={name: float(value) for name, value in zip(system.load_names, state.loads, strict=True)},
-        displacement=state.u,
+        displacement=system.body_part(state.u),
         element_pressure=system.element_pressure(state),
         element_dilatation=system.dilatation(state),
         von_mises=stress.nodal,
@@ -71,12 +71,13 @@ def to_record(
             "wall_s": wall_s,
             "contact_penalty": state.penalty,
             "contact_grips": [rows.tolist() for rows in state.grips],
+            "bodies_mm": state.u[system.mesh.n_points :].tolist(),
             "load_fraction": equilibrium.fraction,
             "event": equilibrium.event or "",
             **({} if duration is None else {"time_s": duration * fraction}),
         },
         standing=standing(system, state, between, reactions),
-        mode=equilibrium.mode,
+        mode=None if equilibrium.mode is None else system.body_part(equilibrium.mode),
     )
 
 
@@ -154,6 +155,8 @@ def _touch(contact: Contact, state: State) -> dict[str, Any]:
         facts["surfaces_intersect"] = intersect
     if touch.force is not None and touch.torque is not None:
         facts |= {"force_N": list(touch.force), "torque_N_mm": list(touch.torque)}
+    if touch.displacement is not None:
+        facts["displacement_mm"] = list(touch.displacement)
     return facts
 
 
@@ -161,7 +164,9 @@ def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     """Return the equilibrium that a record was made of, as a start for the solver."""
     loads = np.array([record.loads[name] for name in system.load_names])
     grips = tuple(np.array(rows).reshape(-1, WIDTH) for rows in record.solver["contact_grips"])
-    state = system.consistent(np.array(record.displacement), loads, record.solver["contact_penalty"], grips)
+    bodies = np.array(record.solver.get("bodies_mm", [])).reshape(-1, system.mesh.dimension)
+    u = np.vstack([record.displacement, bodies])
+    state = system.consistent(u, loads, record.solver["contact_penalty"], grips)
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)

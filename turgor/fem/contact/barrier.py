@@ -109,7 +109,8 @@ class Barrier(Unlagged):
 
     def force(self, state: State, out: Floats) -> None:
         """Add the contact forces, N."""
-        out += self.facets.weights.T @ self._pushes(state.u)[: self._n]
+        nodal = self.facets.weights.T @ self._pushes(state.u)[: self._n]
+        out[: len(nodal)] += nodal
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
@@ -178,7 +179,7 @@ class Barrier(Unlagged):
             arm = in_space(near.places[self._n :] - self._hull.reference_point)
             force, torque = resultants(push, arm, turned=self._turned)
         per_wall = None if gap is None else gap / self._wall
-        return Touch(self.name, area, 0.0, 0.0, force, torque, gap, per_wall, barrier=True)
+        return Touch(self.name, area, 0.0, 0.0, force, torque, gap=gap, gap_per_wall=per_wall, barrier=True)
 
     def gripped(self, state: State, *, dragged: bool) -> Floats:
         """Return nothing: there is no friction."""

@@ -57,7 +57,7 @@ class Facets:
 
     def places(self, u: Floats) -> Floats:
         """Return where the vertices are at the displacement `u` ``(n_points, d)``: ``(n, d)``, mm."""
-        return np.asarray(self.weights @ (self.skin.points[:, : self.skin.dimension] + u))
+        return np.asarray(self.weights @ (self.skin.space(u)[:, : self.skin.dimension]))
 
     def normals(self, places: Floats) -> Floats:
         """Return the outward unit normals ``(m, 3)`` of the pieces, their vertices at `places` ``(n, 3)``."""

@@ -11,7 +11,8 @@ from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch, Triple, re
 from turgor.fem.pattern import packed_size
 from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
-from turgor.fem.term import NO_NODES, add_at_nodes, pack_symmetric
+from turgor.fem.term import NO_NODES, Unlagged, add_at_nodes, pack_symmetric
+from turgor.mesh.mesh import in_space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -42,6 +43,8 @@ class Obstacle:
         Coefficient of friction.
     number
         Place of what it remembers in ``State.grips``.
+    node
+        Row of ``State.u`` that is the displacement of the body on its spring; ``None``: it is on none.
 
     Attributes
     ----------
@@ -61,6 +64,7 @@ class Obstacle:
         turned: bool = False,
         friction: float = 0.0,
         number: int = 0,
+        node: int | None = None,
     ) -> None:
         self.skin = skin
         self.body = body
@@ -71,6 +75,11 @@ class Obstacle:
         self.friction = friction
         self._turned = turned
         self._number = number
+        self._node = node
+        # What counts is where points are as seen from the body: its displacement goes in with minus one.
+        seen = [] if node is None else [-1.0]
+        self._shape = np.hstack([skin.shape, np.tile(seen, (len(skin.shape), 1))])
+        self._nodes = np.hstack([skin.faces, np.full((len(skin.faces), len(seen)), node or 0, np.int32)])
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
@@ -88,7 +97,7 @@ class Obstacle:
         push = self._pushes(state)
         touching = np.flatnonzero(push.any(axis=(1, 2)))
         self._rubbing(state).add_force(out)
-        add_at_nodes(self.skin.faces[touching], np.einsum("qa,fqi->fai", self.skin.shape, push[touching]), out)
+        add_at_nodes(self._nodes[touching], np.einsum("qa,fqi->fai", self._shape, push[touching]), out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
@@ -99,7 +108,7 @@ class Obstacle:
         touching = np.flatnonzero((gap < 0.0).any(axis=1))
         stiffness = self._normal_stiffness(state)[touching] * (gap[touching] < 0.0)
         force = stiffness * np.minimum(lagged[touching], 0.0)
-        n, N = normal[touching], self.skin.shape
+        n, N = normal[touching], self._shape
         at_points = stiffness[:, :, None, None] * n[:, :, :, None] * n[:, :, None, :]
         at_points += force[:, :, None, None] * curvature[touching]
         full = np.einsum("qa,qb,fqij->faibj", N, N, at_points, optimize=True)
@@ -108,12 +117,12 @@ class Obstacle:
         packed = np.empty((len(touching), packed_size(rows)))
         pack_symmetric(full, packed)
         rubbing = self._rubbing(state)
-        return np.vstack([self.skin.faces[touching], rubbing.nodes]), np.vstack([packed, rubbing.blocks()])
+        return np.vstack([self._nodes[touching], rubbing.nodes]), np.vstack([packed, rubbing.blocks()])
 
     def couplings(self, u: Floats) -> Ints:
-        """Return nothing: the nodes of a face are coupled anyway."""
+        """Return every face's nodes with a body on a spring; without one nothing: a face's are coupled anyway."""
         del u
-        return self.skin.faces[:0]
+        return self._nodes[:0] if self._node is None else self._nodes
 
     def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return the distance of every quadrature point inside the body, else zero, ``(k, q)``, mm."""
@@ -135,8 +144,8 @@ class Obstacle:
         gap, normal, curvature = self._gaps(state.u, state.loads)
         stiffness = self._normal_stiffness(state) * (gap < 0.0)
         change = (normal @ self.motion)[:, :, None] * normal + gap[:, :, None] * (curvature @ self.motion)
-        values = np.einsum("qa,fqi->fai", self.skin.shape, -stiffness[:, :, None] * change)
-        add_at_nodes(self.skin.faces, values, out)
+        values = np.einsum("qa,fqi->fai", self._shape, -stiffness[:, :, None] * change)
+        add_at_nodes(self._nodes, values, out)
         rubbing = self._rubbing(state)
         add_at_nodes(rubbing.nodes, -rubbing.weights[:, :, None] * (rubbing.tangent @ self.motion)[:, None, :], out)
 
@@ -167,6 +176,7 @@ class Obstacle:
             overlap_per_wall=float((overlap / self.skin.wall[:, None]).max()),
             force=force,
             torque=torque,
+            displacement=self._displacement(state),
         )
 
     def intersects(self, state: State) -> None:
@@ -181,17 +191,16 @@ class Obstacle:
         gap, normal, _ = self._gaps(state.u, state.loads)
         face, quad = np.nonzero(gap < 0.0)
         force = -(self._normal_stiffness(state) * gap)[face, quad]
-        place = (self._places(state.u) - self._shift(state.loads))[face, quad]
+        place = self._places(state.u, state.loads)[face, quad]
         rubs = self._rubbing(state)
         slip = rubs.elastic_slip if dragged else rubs.slip
         return renewed(rows, slip, make_rows(face, quad, force, normal[face, quad], place))
 
     def _rubbing(self, state: State) -> Rubbing:
         rows, d = grips_in(state, self._number), self.skin.dimension
-        face, quad, nodes = points_of(rows, self.skin)
-        weights = self.skin.shape[quad]
-        here = np.einsum("na,nai->ni", weights, self.skin.points[nodes][:, :, :d] + state.u[nodes])
-        apart = here - self._shift(state.loads) - rows[:, PLACE][:, :d]
+        face, quad, _ = points_of(rows, self.skin)
+        nodes, weights = self._nodes[face], self._shape[quad]
+        apart = self._places(state.u, state.loads)[face, quad] - rows[:, PLACE][:, :d]
         stiffness = self._normal_stiffness(state)[face, quad]
         return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
 
@@ -201,22 +210,33 @@ class Obstacle:
         rows = grips_in(state, self._number)
         face, quad, _ = points_of(rows, self.skin)
         np.add.at(push, (face, quad), self._rubbing(state).drag)
-        arm = self._places(state.u) - (self.body.reference_point + self._shift(state.loads))
+        arm = self._places(state.u, state.loads) - self.body.reference_point
         push, arm = (np.pad(v.reshape(-1, v.shape[2]), ((0, 0), (0, 3 - v.shape[2]))) for v in (push, arm))
         return resultants(push, arm, turned=self._turned)
+
+    def _displacement(self, state: State) -> Triple | None:
+        """Return how far the body is from its place at rest; nothing if it stands still."""
+        if self._node is None and not self.moves:
+            return None
+        on_spring = 0.0 if self._node is None else state.u[self._node]
+        x, y, z = in_space(self._shift(state.loads) + on_spring)
+        return float(x), float(y), float(z)
 
     def _shift(self, loads: Floats) -> Floats:
         return self.motion * (loads[self.channel] if self.moves else 0.0)
 
-    def _places(self, u: Floats) -> Floats:
-        return self._at_points(self.skin.points[:, : self.skin.dimension] + u)
+    def _places(self, u: Floats, loads: Floats) -> Floats:
+        """Return where the quadrature points are as seen from the body, ``(k, q, d)``."""
+        rest = self.skin.points[:, : self.skin.dimension][self.skin.faces]
+        at_rest = np.einsum("qa,fai->fqi", self.skin.shape, rest)
+        return np.asarray(at_rest + self._at_points(u) - self._shift(loads))
 
     def _at_points(self, field: Floats) -> Floats:
-        return np.asarray(np.einsum("qa,fai->fqi", self.skin.shape, field[self.skin.faces]))
+        return np.asarray(np.einsum("qa,fai->fqi", self._shape, field[self._nodes]))
 
     def _gaps(self, u: Floats, loads: Floats) -> tuple[Floats, Floats, Floats]:
         """Return distance ``(k, q)``, normal ``(k, q, d)`` and curvature ``(k, q, d, d)`` at the quadrature points."""
-        x = self._places(u) - self._shift(loads)
+        x = self._places(u, loads)
         d = x.shape[2]
         gap, normal, curvature = self.body.distance(x.reshape(-1, d))
         return gap.reshape(x.shape[:2]), normal.reshape(x.shape), curvature.reshape(*x.shape, d)
@@ -228,3 +248,35 @@ class Obstacle:
         """Return what each point pushes the body with, ``(k, q, d)``, N."""
         gap, normal, _ = self._gaps(state.u, state.loads)
         return np.asarray((self._normal_stiffness(state) * np.minimum(gap, 0.0))[:, :, None] * normal)
+
+
+class BodySpring(Unlagged):
+    """½ k |u|²: the spring that a rigid body is on, u its displacement.
+
+    Parameters
+    ----------
+    node
+        Row of ``State.u`` that is the displacement; across the spring it is given as zero.
+    stiffness
+        k, N/mm.
+    dimension
+        Number of displacement components.
+    """
+
+    def __init__(self, node: int, stiffness: float, dimension: int) -> None:
+        self.nodes = np.array([[node]], np.int32)
+        self._node, self._stiffness = node, stiffness
+        self._block = stiffness * np.eye(dimension)[None]
+
+    def energy(self, state: State) -> float:
+        """Return the energy, N mm."""
+        return 0.5 * self._stiffness * float(state.u[self._node] @ state.u[self._node])
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the spring's force, N."""
+        out[self._node] += self._stiffness * state.u[self._node]
+
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
+        """Fill k, N/mm."""
+        del state, lagged
+        pack_symmetric(self._block, out)

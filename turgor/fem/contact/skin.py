@@ -116,7 +116,7 @@ class Skin:
     def space(self, u: Floats) -> Floats:
         """Return where the nodes are after the displacement `u` ``(n_points, d)``: ``(n_points, 3)``, mm."""
         x = self.points.copy()
-        x[:, : self.dimension] += u
+        x[:, : self.dimension] += u[: len(x)]  # behind the nodes come rigid bodies
         return x
 
     def shape_at(self, local: Floats) -> Floats:

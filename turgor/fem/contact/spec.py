@@ -76,6 +76,20 @@ class PairContact:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """What a rigid body is on: it moves along `direction` only, held by `stiffness`, N/mm."""
+
+    stiffness: float
+    direction: Vector
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.stiffness < np.inf:
+            raise InputError("a spring's stiffness must be positive", key="contact.spring", value=self.stiffness)
+        if not np.linalg.norm(self.direction) > 0.0:
+            raise InputError("this direction has no length", key="contact.spring.direction", value=self.direction)
+
+
+@dataclass(frozen=True)
 class RigidContact:
     """The skin, or one surface of it, may meet a rigid body.
 
@@ -86,13 +100,16 @@ class RigidContact:
     surface
         The surface that may meet it; ``None``: the whole skin.
     motion
-        Its displacement at load fraction one, mm, in proportion before; ``None``: it stands still.
+        Its displacement at load fraction one, mm, in proportion before; ``None``: it stands still. With a spring, that
+        of the spring's far end.
     label
         What the body is called in results.
     friction
         Coefficient of friction, 0 or more.
     method
         ``penalty`` on overlaps or ``barrier`` before them.
+    spring
+        What the body is on: the force on it is the spring's stiffness times its displacement.
     """
 
     body: RigidBody
@@ -101,6 +118,7 @@ class RigidContact:
     label: str = "body"
     friction: float = 0.0
     method: Method = "penalty"
+    spring: Spring | None = None
 
     def __post_init__(self) -> None:
         _check(self)
@@ -122,6 +140,7 @@ def make_contact(
     channel: int | None,
     section: Section | None = None,
     number: int = 0,
+    node: int | None = None,
 ) -> Contact:
     """Return the term of a contact.
 
@@ -139,6 +158,8 @@ def make_contact(
         What a plane mesh stands for.
     number
         Place of what friction remembers in ``State.grips``.
+    node
+        Row of ``State.u`` that is the displacement of a rigid body on a spring.
 
     Raises
     ------
@@ -157,7 +178,7 @@ def make_contact(
             error = PARTS_OF_REACH * REACH * float(skin.wall.min())
             around = hull(body, mesh.points, error, f"contact.{case.name}")
             return Barrier(skin, None, case.name, section, around)
-        return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number)
+        return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number, node)
     if isinstance(case, PairContact):
         first, second = mesh.surface(case.first), mesh.surface(case.second)
         group = np.repeat(np.array([0, 1], np.int32), [len(first), len(second)])
@@ -167,6 +188,12 @@ def make_contact(
     if barrier:
         return Barrier(skin, group, case.name, section)
     return SurfaceContact(skin, group, case.name, case.friction, number)
+
+
+def spring_direction(case: RigidContact, mesh: Mesh, section: Section | None) -> Floats:
+    """Return the direction ``(d,)`` along which the body moves on its spring; raise InputError if it does not fit."""
+    assert case.spring is not None
+    return in_section(case.spring.direction, mesh, section, f"contact.{case.name}.spring", total=True)
 
 
 def _check(case: ContactCase) -> None:
@@ -187,11 +214,11 @@ def _check(case: ContactCase) -> None:
             value=case.friction,
             expected="0, or method: penalty",
         )
-    if case.method == "barrier" and isinstance(case, RigidContact) and case.motion is not None:
+    if case.method == "barrier" and isinstance(case, RigidContact) and (case.motion or case.spring) is not None:
         raise InputError(
             "the barrier knows no rigid body that moves",
-            key=f"contact.{case.name}.motion",
-            value=case.motion,
+            key=f"contact.{case.name}",
+            value=case.motion or case.spring,
             expected="a body that stands still, or method: penalty",
         )
 

@@ -41,6 +41,8 @@ class Touch:
     force, torque
         What a rigid body feels, N and N mm, the torque about its reference point; ``None`` for contact of the
         body with itself.
+    displacement
+        Of a rigid body that moves or is on a spring, mm.
     gap, gap_per_wall
         By a barrier nothing ever overlaps: the smallest gap, mm, and over the thinnest wall; ``None`` by a penalty,
         and where nothing is within the barrier's reach.
@@ -54,6 +56,7 @@ class Touch:
     overlap_per_wall: float
     force: tuple[float, float, float] | None = None
     torque: tuple[float, float, float] | None = None
+    displacement: Triple | None = None
     gap: float | None = None
     gap_per_wall: float | None = None
     barrier: bool = False
