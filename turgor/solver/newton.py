@@ -108,8 +108,8 @@ TRIALS = 5
 LESS = 0.9
 """With a barrier, a step after which forces are less out of balance by this factor is taken even if the merit rises.
 
-Near its equilibria the tangent need not be definite, and the merit would shorten every step (two boxes that meet took
-60 iterations in place of 22).
+Near its equilibria the tangent need not be definite, and the merit would shorten every step: two boxes that meet at
+20 and 30 kPa took 34 and 46 iterations in place of 23 and 34.
 """
 
 ROUNDING = 1e-9
