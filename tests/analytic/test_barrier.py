@@ -7,13 +7,13 @@ import pytest
 from contact_bodies import half_chamber, merged, shifted_mesh
 from samples import neo_hookean
 
-from turgor.fem.contact.spec import RigidContact, SelfContact
+from turgor.fem.contact.spec import RigidContact, SelfContact, Spring
 from turgor.fem.loads import Pressure
 from turgor.fem.rigid import Plane
 from turgor.fem.section import PlaneStrain
 from turgor.fem.supports import Clamped, Prescribed, Sliding
 from turgor.fem.system import System
-from turgor.mesh.structured import rectangle
+from turgor.mesh.structured import box, rectangle
 from turgor.solver.path import solve_path
 
 pytest.importorskip("ipctk")
@@ -66,6 +66,30 @@ def test_a_chamber_presses_on_a_plane_as_hard_as_its_mount_carries():
         assert total[2] == pytest.approx(touch.force[2], rel=1e-6)
         forces.append(touch.force[2])
     assert forces[1] == pytest.approx(forces[0], rel=0.03)
+
+
+def test_a_plate_is_pressed_on_a_block_as_by_penalties():
+    # The plate is led through the gap and 0.1 mm further; on a spring, a chamber lifts it.
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
+    forces = []
+    for method in ("penalty", "barrier"):
+        plate = RigidContact(Plane((0.0, 0.0, 1.05), (0.0, 0.0, -1.0)), "z1", (0.0, 0.0, -0.15), "plate", method=method)
+        supports = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
+        system = System(mesh, {"body": neo_hookean(0.1, 10.0)}, supports, contact=[plate])
+        state = solve_path(system, [0.5, 1.0])[-1].state
+        touch = system.touches(state)[0]
+        assert touch.displacement == pytest.approx((0.0, 0.0, -0.15))
+        forces.append(touch.force[2])
+    assert forces[0] > 0.05
+    assert forces[1] == pytest.approx(forces[0], rel=0.1)  # the gap is a part of the way
+    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6))
+    spring = Spring(0.1, (0.0, 0.0, 1.0))
+    plate = RigidContact(Plane((0.0, 0.0, 12.2), (0.0, 0.0, -1.0)), label="plate", method="barrier", spring=spring)
+    loads, supports = [Pressure("cavity", 0.02)], [Clamped("z0"), Sliding("y0")]
+    system = System(one, {"body": neo_hookean(0.1, 1000.0)}, supports, loads, contact=[plate])
+    touch = system.touches(solve_path(system, [0.5, 1.0])[-1].state)[0]
+    assert touch.force[2] > 0.01
+    assert touch.force[2] == pytest.approx(0.1 * touch.displacement[2], rel=1e-6)
 
 
 def test_blocks_pressed_together_in_the_plane():

@@ -12,7 +12,7 @@ from samples import neo_hookean, shifted
 
 from turgor.common.errors import InputError, MissingPackageError
 from turgor.fem.contact.hull import hull
-from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
+from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact, Spring
 from turgor.fem.frames import block_products
 from turgor.fem.rigid import Box, Cylinder, Plane, Sphere
 from turgor.fem.section import Axisymmetric, PlaneStrain
@@ -99,6 +99,26 @@ def test_rigid_body_feels_what_the_skin_does(name):
     assert force[2] < 0.0
 
 
+@pytest.mark.parametrize("led", [{"spring": Spring(0.7, (0.3, 0.1, 1.0))}, {"motion": (0.02, 0.01, 0.2)}], ids=str)
+def test_a_body_that_gives_way_or_moves_is_a_part_of_the_potential(led):
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
+    contact = [RigidContact(BODIES["sphere"], method="barrier", **led)]
+    system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=contact)
+    u = np.zeros_like(system.constraints.value)
+    u[:-1, 2] = -0.18
+    u[:-1] += 2e-4 * np.random.default_rng(3).standard_normal(mesh.points.shape)
+    u[-1] = 0.02 * np.array([0.3, 0.1, 1.0])
+    state = system.consistent(u, system.loads_at(1.0))
+    assert system.touches(state)[0].displacement == pytest.approx(u[-1])
+    direction = np.random.default_rng(4).standard_normal(u.shape)
+    more, less = (system.energy(shifted(state, direction, h)) for h in (1e-7, -1e-7))
+    assert np.vdot(system.forces(state)[0], direction) == pytest.approx((more - less) / 2e-7, rel=1e-5)
+    system.stiffness(state)
+    more, less = (system.forces(shifted(state, direction, h))[0] for h in (1e-7, -1e-7))
+    expected = (more - less) / 2e-7
+    np.testing.assert_allclose(system.stiffness_times(direction), expected, atol=1e-6 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_hulls_follow_their_bodies(name):
     points = np.random.default_rng(0).uniform(-1.0, 2.0, (50, 3))
@@ -156,8 +176,8 @@ def test_refusals():
         SelfContact(0.3, method="barrier")
     with pytest.raises(InputError, match="no such method"):
         SelfContact(method="lagrange")
-    with pytest.raises(InputError, match="moves"):
-        RigidContact(BODIES["plane"], motion=(0.0, 0.0, 1.0), method="barrier")
+    with pytest.raises(InputError, match="far end"):
+        RigidContact(BODIES["plane"], motion=(0.0, 0.0, 1.0), method="barrier", spring=Spring(1.0, (0.0, 0.0, 1.0)))
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     body = TriangleBody(corners - [0, 0, 3], np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
     with pytest.raises(InputError, match="does not know this body"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,18 +102,23 @@ def compile_constraints(
     )
 
 
-def with_bodies(constraints: Constraints, directions: Iterable[Floats]) -> Constraints:
-    """Return the constraints with a row more for each rigid body that only moves along a direction ``(d,)``."""
-    frames = [_completed(direction[None] / np.linalg.norm(direction))[::-1] for direction in directions]
-    if not frames:
+def with_bodies(constraints: Constraints, bodies: Sequence[tuple[Floats, bool]]) -> Constraints:
+    """Return the constraints with a row more for each rigid body.
+
+    Each is led by a vector ``(d,)``: it moves freely along it, and only along it, or by it at load fraction one.
+    """
+    if not bodies:
         return constraints
     n, d = constraints.fixed.shape
-    held = np.ones((len(frames), d), bool)
-    held[:, -1] = False
+    frames = np.array([_completed(vector[None] / np.linalg.norm(vector))[::-1] for vector, _ in bodies])
+    fixed = np.ones((len(bodies), d), bool)
+    fixed[:, -1] = [not free for _, free in bodies]
+    value = np.zeros((len(bodies), d))
+    value[:, -1] = [0.0 if free else frame[-1] @ vector for frame, (vector, free) in zip(frames, bodies, strict=True)]
     return Constraints(
-        np.vstack([constraints.fixed, held]),
-        np.vstack([constraints.value, np.zeros((len(frames), d))]),
-        np.concatenate([constraints.frame_nodes, n + np.arange(len(frames), dtype=np.int32)]),
+        np.vstack([constraints.fixed, fixed]),
+        np.vstack([constraints.value, value]),
+        np.concatenate([constraints.frame_nodes, n + np.arange(len(bodies), dtype=np.int32)]),
         np.concatenate([constraints.frames, frames]),
     )
 

@@ -14,7 +14,7 @@ from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
-from turgor.fem.contact.spec import ContactCase, RigidContact, make_contact, spring_direction
+from turgor.fem.contact.spec import ContactCase, RigidContact, led, make_contact
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -81,7 +81,7 @@ class System:
         self.mesh = mesh
         self.section = section
         self.solids = _solids(mesh, materials, section)
-        moving = [c for c in contact if isinstance(c, RigidContact) and c.motion is not None]
+        moving = [c for c in contact if isinstance(c, RigidContact) and c.is_load]
         self.loads = (*loads, *moving)
         self.load_names = _load_names(self.loads)
         self._programmes = [_programme(load) for load in self.loads]
@@ -94,9 +94,9 @@ class System:
             for s in springs
         ]
         check_held(mesh, self.constraints, springs, section)
-        self._on_springs = [c for c in contact if isinstance(c, RigidContact) and c.spring is not None]
-        self.constraints = with_bodies(self.constraints, [spring_direction(c, mesh, section) for c in self._on_springs])
-        bodies = [self._spring(case) for case in self._on_springs]
+        self._unknown_bodies = [c for c in contact if isinstance(c, RigidContact) and c.is_unknown]
+        self.constraints = with_bodies(self.constraints, [led(c, mesh, section) for c in self._unknown_bodies])
+        bodies = self._springs()
         self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
         caps = [cap for cavity in self.cavities for cap in cavity.caps]
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
@@ -314,22 +314,20 @@ class System:
 
     def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
         pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
-        channel = self.loads.index(case) if isinstance(case, RigidContact) and case.motion is not None else None
+        channel = self.loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
         return make_contact(self.mesh, materials, case, pressure, channel, self.section, number, self._row(case))
 
     @property
     def _rest(self) -> Floats:
-        """No displacement, ``(n_points + n_bodies, d)``: a row for each node, then one for each body on a spring."""
+        """No displacement, ``(n_points + n_bodies, d)``: a row for each node, then one for each unknown body."""
         return np.zeros_like(self.constraints.value)
 
     def _row(self, case: ContactCase) -> int | None:
-        return self.mesh.n_points + self._on_springs.index(case) if case in self._on_springs else None
+        return self.mesh.n_points + self._unknown_bodies.index(case) if case in self._unknown_bodies else None
 
-    def _spring(self, case: RigidContact) -> BodySpring:
-        row = self._row(case)
-        assert row is not None
-        assert case.spring is not None
-        return BodySpring(row, case.spring.stiffness, self.mesh.dimension)
+    def _springs(self) -> list[BodySpring]:
+        rows = enumerate(self._unknown_bodies, self.mesh.n_points)
+        return [BodySpring(row, c.spring.stiffness, self.mesh.dimension) for row, c in rows if c.spring is not None]
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         mesh = self.mesh

@@ -143,11 +143,10 @@ class ContactCase(StrictModel):
         if self.friction > 0.0 or rubs:
             key = "friction" if self.friction > 0.0 else rubs[0]
             raise invalid("the barrier knows no friction", key=key, expected="no friction, or method: penalty")
-        moving = [f"bodies.{k}.move" for k, body in enumerate(self.bodies) if body.move is not None]
-        moving += [f"bodies.{k}.spring" for k, body in enumerate(self.bodies) if body.spring is not None]
-        if moving:
-            expected = "a body that stands still, or method: penalty"
-            raise invalid("the barrier knows no rigid body that moves", key=moving[0], expected=expected)
+        both = [f"bodies.{k}.move" for k, body in enumerate(self.bodies) if body.move and body.spring]
+        if both:
+            expected = "move or spring, or method: penalty"
+            raise invalid("by the barrier a spring has no far end that moves", key=both[0], expected=expected)
 
     @property
     def labels(self) -> list[str]:

@@ -17,7 +17,7 @@ from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.hull import Hull
 from turgor.fem.contact.intersection import edges_and_triangles
 from turgor.fem.contact.skin import Skin
-from turgor.fem.contact.term import Touch, resultants
+from turgor.fem.contact.term import Touch, resultants, triple
 from turgor.fem.pattern import packed_size
 from turgor.fem.section import Axisymmetric, Section, depth
 from turgor.fem.state import State
@@ -73,6 +73,8 @@ class Barrier(Unlagged):
         What a plane mesh stands for.
     hull
         A rigid body; then the faces meet it, not each other.
+    node
+        Row of ``State.u`` that is the displacement of the body; ``None``: it stands still.
 
     Raises
     ------
@@ -86,14 +88,21 @@ class Barrier(Unlagged):
     friction = 0.0
 
     def __init__(
-        self, skin: Skin, group: Ints | None, name: str, section: Section | None = None, hull: Hull | None = None
+        self,
+        skin: Skin,
+        group: Ints | None,
+        name: str,
+        section: Section | None = None,
+        hull: Hull | None = None,
+        node: int | None = None,
     ) -> None:
         self._ipctk = require("ipctk", "contact by the barrier method")
-        self.skin, self.name, self._hull = skin, name, hull
+        self.skin, self.name, self._hull, self._node = skin, name, hull, node
         self.facets = Facets(skin)
         self._d = skin.dimension
         self._turned = isinstance(section, Axisymmetric)
-        self._spread = sp.kron(self.facets.weights, sp.identity(self._d), format="csr")
+        self._rest, self._weights = self._vertices()
+        self._spread = sp.kron(self._weights, sp.identity(self._d), format="csr")
         self._mesh = self._collision_mesh(group, section)
         self._found: list[tuple[Floats, _Near]] = []
         wall = float(skin.wall.min())
@@ -109,7 +118,7 @@ class Barrier(Unlagged):
 
     def force(self, state: State, out: Floats) -> None:
         """Add the contact forces, N."""
-        nodal = self.facets.weights.T @ self._pushes(state.u)[: self._n]
+        nodal = self._weights.T @ self._pushes(state.u)
         out[: len(nodal)] += nodal
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
@@ -120,8 +129,7 @@ class Barrier(Unlagged):
         del lagged
         near, d = self._near(state.u), self._d
         hessian = self._potential.hessian(near.collisions, self._mesh, near.places)
-        moving = sp.csr_matrix(hessian)[: self._n * d, : self._n * d]
-        whole = (self._spread.T @ moving @ self._spread).tobsr((d, d))
+        whole = (self._spread.T @ sp.csr_matrix(hessian) @ self._spread).tobsr((d, d))
         whole.sort_indices()
         first = np.repeat(np.arange(len(whole.indptr) - 1), np.diff(whole.indptr))
         upper = first <= whole.indices
@@ -141,7 +149,17 @@ class Barrier(Unlagged):
         They look at each other, each from the other's front: neighbours on one surface and the two sides of a wall
         do not.
         """
+        soon = self._soon_coupled(u)
+        now = self._coupled(u)
+        # of one width: the last node again and again
+        now = np.hstack([now, np.repeat(now[:, 1:], soon.shape[1] - 2, axis=1)])
+        return np.concatenate([soon, now]).astype(np.int32)
+
+    def _soon_coupled(self, u: Floats) -> Ints:
         faces, around = self.skin.faces, self.facets.around
+        if self._hull is not None:
+            # what meets a rigid body is one face, and the body's own row if it moves
+            return faces[:0] if self._node is None else np.insert(faces, faces.shape[1], self._node, axis=1)
         x = in_space(self.facets.places(u))
         normal = self._vertex_normals(x)
         i, j = cKDTree(x).query_pairs(SOON * self.skin.size, output_type="ndarray").T
@@ -152,11 +170,7 @@ class Barrier(Unlagged):
         ones = np.ones(int(opposed.sum()), np.float32)
         pairs = sp.csr_matrix((ones, (i[opposed], j[opposed])), shape=(len(x),) * 2)
         facing = sp.coo_matrix(around @ pairs @ around.T)
-        soon = np.hstack([faces[facing.row], faces[facing.col]])
-        now = self._coupled(u)
-        # of one width: the last node again and again
-        now = np.hstack([now, np.repeat(now[:, 1:], soon.shape[1] - 2, axis=1)])
-        return np.concatenate([soon, now]).astype(np.int32)
+        return np.hstack([faces[facing.row], faces[facing.col]])
 
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which nothing meets anything, by continuous collision detection."""
@@ -176,10 +190,11 @@ class Barrier(Unlagged):
         force = torque = None
         if self._hull is not None:
             push = -in_space(pushes[self._n :])
-            arm = in_space(near.places[self._n :] - self._hull.reference_point)
+            arm = in_space(self._rest[self._n :] - self._hull.reference_point)
             force, torque = resultants(push, arm, turned=self._turned)
         per_wall = None if gap is None else gap / self._wall
-        return Touch(self.name, area, 0.0, 0.0, force, torque, gap=gap, gap_per_wall=per_wall, barrier=True)
+        moved = None if self._node is None else triple(in_space(state.u[self._node]))
+        return Touch(self.name, area, 0.0, 0.0, force, torque, moved, gap, per_wall, barrier=True)
 
     def gripped(self, state: State, *, dragged: bool) -> Floats:
         """Return nothing: there is no friction."""
@@ -196,8 +211,20 @@ class Barrier(Unlagged):
         return len(self.facets.face)
 
     def _places(self, u: Floats) -> Floats:
-        places = self.facets.places(u)
-        return np.asfortranarray(places if self._hull is None else np.vstack([places, self._hull.vertices]))
+        return np.asfortranarray(self._rest + self._weights @ u[: self._weights.shape[1]])
+
+    def _vertices(self) -> tuple[Floats, sp.csr_matrix]:
+        """Return all vertices at rest, those of a rigid body last, and what each row of ``State.u`` counts in them."""
+        weights, n = self.facets.weights, len(self.skin.points)
+        rest = weights @ self.skin.points[:, : self._d]
+        if self._hull is None:
+            return rest, weights
+        columns, vertices = n if self._node is None else self._node + 1, np.arange(len(self._hull.vertices))
+        led = vertices[:0] if self._node is None else vertices
+        at = (led, np.full(len(led), columns - 1))
+        bodies = sp.csr_matrix((np.ones(len(led)), at), shape=(len(vertices), columns))
+        own = sp.csr_matrix((weights.data, weights.indices, weights.indptr), shape=(self._n, columns))
+        return np.vstack([rest, self._hull.vertices]), sp.vstack([own, bodies], format="csr")
 
     def _near(self, u: Floats) -> _Near:
         for at, found in self._found:
@@ -245,7 +272,7 @@ class Barrier(Unlagged):
     def _collision_mesh(self, group: Ints | None, section: Section | None) -> Any:
         """Return the IPC Toolkit's mesh at rest, with the areas of the model and of who may meet whom."""
         ipctk, facets = self._ipctk, self.facets
-        rest = self._places(np.zeros((len(self.skin.points), self._d)))
+        rest = np.asfortranarray(self._rest)
         edges, triangles = edges_and_triangles(facets.pieces)
         patch = None if group is None else group[facets.face]
         if self._hull is not None:

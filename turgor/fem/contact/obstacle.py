@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.skin import STIFFNESS, Skin
-from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch, Triple, resultants
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch, Triple, resultants, triple
 from turgor.fem.pattern import packed_size
 from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
@@ -219,8 +219,7 @@ class Obstacle:
         if self._node is None and not self.moves:
             return None
         on_spring = 0.0 if self._node is None else state.u[self._node]
-        x, y, z = in_space(self._shift(state.loads) + on_spring)
-        return float(x), float(y), float(z)
+        return triple(in_space(self._shift(state.loads) + on_spring))
 
     def _shift(self, loads: Floats) -> Floats:
         return self.motion * (loads[self.channel] if self.moves else 0.0)

@@ -128,6 +128,16 @@ class RigidContact:
         """What the contact is called in results."""
         return self.label
 
+    @property
+    def is_load(self) -> bool:
+        """Whether its motion is a load; a barrier's body is led like a support, so that no step takes it too far."""
+        return self.motion is not None and self.method == "penalty"
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether its displacement is a row of ``State.u``."""
+        return self.spring is not None or (self.motion is not None and any(self.motion) and not self.is_load)
+
 
 ContactCase = SelfContact | PairContact | RigidContact
 
@@ -177,7 +187,7 @@ def make_contact(
         if barrier:
             error = PARTS_OF_REACH * REACH * float(skin.wall.min())
             around = hull(body, mesh.points, error, f"contact.{case.name}")
-            return Barrier(skin, None, case.name, section, around)
+            return Barrier(skin, None, case.name, section, around, node)
         return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number, node)
     if isinstance(case, PairContact):
         first, second = mesh.surface(case.first), mesh.surface(case.second)
@@ -190,10 +200,15 @@ def make_contact(
     return SurfaceContact(skin, group, case.name, case.friction, number)
 
 
-def spring_direction(case: RigidContact, mesh: Mesh, section: Section | None) -> Floats:
-    """Return the direction ``(d,)`` along which the body moves on its spring; raise InputError if it does not fit."""
-    assert case.spring is not None
-    return in_section(case.spring.direction, mesh, section, f"contact.{case.name}.spring", total=True)
+def led(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[Floats, bool]:
+    """Return what a body whose displacement is a row of ``State.u`` is led by ``(d,)``, and whether it is free in it.
+
+    That is the direction of its spring, or its motion. InputError is raised if it does not fit the model.
+    """
+    if case.spring is not None:
+        return in_section(case.spring.direction, mesh, section, f"contact.{case.name}.spring", total=True), True
+    assert case.motion is not None
+    return in_section(case.motion, mesh, section, f"contact.{case.name}.motion", total=True), False
 
 
 def _check(case: ContactCase) -> None:
@@ -214,12 +229,12 @@ def _check(case: ContactCase) -> None:
             value=case.friction,
             expected="0, or method: penalty",
         )
-    if case.method == "barrier" and isinstance(case, RigidContact) and (case.motion or case.spring) is not None:
+    if case.method == "barrier" and isinstance(case, RigidContact) and case.motion and case.spring:
         raise InputError(
-            "the barrier knows no rigid body that moves",
+            "by the barrier a spring has no far end that moves",
             key=f"contact.{case.name}",
-            value=case.motion or case.spring,
-            expected="a body that stands still, or method: penalty",
+            value=case.motion,
+            expected="a motion or a spring, or method: penalty",
         )
 
 

@@ -104,4 +104,9 @@ def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Trip
     force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
     if turned:
         force[0] = torque[2] = 0.0
-    return (float(force[0]), float(force[1]), float(force[2])), (float(torque[0]), float(torque[1]), float(torque[2]))
+    return triple(force), triple(torque)
+
+
+def triple(vector: Floats) -> Triple:
+    """Return the three components of a vector."""
+    return float(vector[0]), float(vector[1]), float(vector[2])
