@@ -8,10 +8,12 @@ import pytest
 
 from turgor.common.errors import InputError, MissingPackageError
 from turgor.geometry.bellows import Bellows
+from turgor.geometry.membrane import Membrane
 from turgor.geometry.pneunet import PneuNet
 from turgor.geometry.tube import CappedTube
 from turgor.mesh.faces import boundary_faces, rim_edges
 from turgor.mesh.generate import LEAST_DISTORTION, generate, nodes_on_polyline, untangled
+from turgor.mesh.layers import FEWEST, outward
 from turgor.mesh.structured import box, shell_octant
 from turgor.mesh.tet10 import jacobian_coefficients
 from turgor.mesh.walls import walls
@@ -153,7 +155,50 @@ def test_layers_follow_the_walls():
     assert np.median(thin[1]) > 1.0
     assert np.median(thin[2]) > 2.0
     # The caps are thick and stay coarse.
-    assert generate(template, 6.0, layers=1).n_cells < 0.5 * generate(template, 1.6).n_cells
+    assert generate(template, 6.0, layers=1).n_cells < 0.6 * generate(template, 1.6).n_cells
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+@pytest.mark.parametrize(
+    "template",
+    [
+        CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm"),
+        PneuNet(chambers=2, symmetric=True),
+        Membrane(segments=1, model="quarter", chamber_length="5 mm", membrane="0.4 mm"),
+    ],
+    ids=lambda template: template.template,
+)
+def test_walls_have_the_layers_that_were_asked_for(template, layers):
+    counted = walls(generate(template, 4.0, layers=layers))
+    assert np.percentile(counted.elements, FEWEST) >= layers
+
+
+def test_layers_that_fall_short_are_meshed_again_finer(monkeypatch, caplog):
+    template, stages = CappedTube(inner_radius="6 mm", wall="2 mm", length="20 mm", cap="4 mm"), []
+    monkeypatch.setattr("turgor.mesh.layers.EDGE_OF_LAYER", 1.7)
+    counted = walls(generate(template, 6.0, layers=2, progress=stages.append))
+    assert stages.count("curving") == 3
+    assert np.percentile(counted.elements, FEWEST) >= 2.0
+    # Twice is not always enough: then it is said.
+    monkeypatch.setattr("turgor.mesh.layers._REPEATS", 0)
+    with caplog.at_level("WARNING"):
+        generate(template, 6.0, layers=2)
+    assert "behind 5 % of the skin walls have fewer than" in caplog.text
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_a_skin_is_turned_outward_whatever_its_sense(symmetric):
+    mesh = generate(PneuNet(chambers=2, symmetric=symmetric), 4.0)
+    skin = boundary_faces(mesh.cells)[:, :3]
+    mixed = skin.copy()
+    mixed[::3] = mixed[::3, ::-1]
+    turned = outward(mesh.points, mixed)
+
+    def normals(triangles):
+        corners = mesh.points[triangles]
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    np.testing.assert_allclose(normals(turned), normals(skin), atol=1e-12)
 
 
 @pytest.mark.parametrize("layers", [0, 200])
@@ -255,6 +300,25 @@ def test_nodes_on_a_polyline_come_in_its_order():
     np.testing.assert_array_equal(places, [[1, 0, 0], [0.5, 0, 0], [0, 0, 0], [0, 0, 0.5], [0, 0, 1]])
     with pytest.raises(InputError, match="edge: no node"):
         nodes_on_polyline(points, np.array([[0.3, 0.3, 0.3]]), "edge")
+
+
+@pytest.mark.parametrize("count", [8, 12])
+def test_round_edges_in_space_get_elements_by_their_radius(count):
+    bellows = Bellows(model="quarter", convolutions=1)
+    mesh = generate(bellows, 3.0, per_circle=count)
+    across = np.column_stack([np.hypot(*mesh.points[:, :2].T), mesh.points[:, 2]])
+    radius = bellows.rounding - bellows.wall / 2
+    lengths = []
+    for centre in (piece.centre for piece in bellows._line(0.0) if piece.centre is not None):
+        on_arc = np.abs(np.linalg.norm(across - centre, axis=1) - radius) < 1e-4
+        faces = np.vstack([faces[:, :3] for faces in mesh.surfaces.values()])
+        corners = mesh.points[faces[on_arc[faces].all(axis=1)]]
+        lengths.append(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel())
+    relative = np.concatenate(lengths) / (2 * math.pi * radius / count)
+    assert len(relative) > 1000
+    assert 0.9 < np.median(relative) < 1.05
+    assert np.percentile(relative, 90) < 1.1
+    assert relative.max() < 1.5
 
 
 @pytest.mark.parametrize("count", [16, 32, 64])

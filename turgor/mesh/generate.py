@@ -16,10 +16,10 @@ from turgor.geometry.actuator import Actuator, Shape
 from turgor.mesh.blocks import structured_mesh
 from turgor.mesh.cells import CELLS, body_cell
 from turgor.mesh.faces import outward_faces
+from turgor.mesh.layers import check_layers, with_layers
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.polyline import nodes_on_polyline
 from turgor.mesh.tet10 import FloatArray, IntArray, jacobian_coefficients
-from turgor.mesh.thickness import wall_thickness
 
 LOG = logger("mesh")
 
@@ -35,16 +35,13 @@ PER_CIRCLE_OF_SECTION = 16
 KINDS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra")}
 """Number of coordinates → the cells that gmsh cuts any shape into, and those of shapes made of blocks."""
 
-_EDGE_OF_LAYER = 0.8
-"""Edge length asked for over the thickness of a layer: between the two sides of a wall gmsh leaves longer ones."""
-
 LEAST_DISTORTION = 0.1
 """Smallest ratio of the bounds of an element's Jacobian; below it a moderate strain turns the element inside out."""
 _HALVINGS = 4
 
 # gmsh's numbers for these elements, and its tetrahedron's nodes in our order.
-_TET10, _TRI6, _TRI3, _LINE3 = 11, 9, 2, 8
-_NODES = {_TET10: 10, _TRI6: 6, _TRI3: 3, _LINE3: 3}
+_TET10, _TRI6, _LINE3 = 11, 9, 8
+_NODES = {_TET10: 10, _TRI6: 6, _LINE3: 3}
 _GMSH_TO_VTK = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
@@ -74,13 +71,14 @@ def generate(
         Smaller edge lengths in mm, by the name of a region or surface. The template's own local sizes, if it has any,
         are refined with `size` and hold where none is given here.
     per_circle
-        Elements along a full circle, at least; 0 lets them be as long as `size`. Left out, the template's own.
+        Elements along a full circle, in tetrahedra about; 0 lets them be as long as `size`. Left out, the template's
+        own.
     cells
         ``tetrahedra`` or ``hexahedra``, of a section ``triangles`` or ``quadrilaterals``; left out, the first of
         the two. The second come in rows, for shapes that are made of blocks; their Jacobian is positive at every node.
     layers
-        Elements through each wall, about: edges follow this part of the wall's thickness, measured on the skin
-        (:mod:`turgor.mesh.thickness`); :mod:`turgor.mesh.walls` counts what came of it. Left out, walls do not count.
+        Elements through the walls, at least, behind all but 5 % of the skin: edges follow the walls' thickness
+        (:mod:`turgor.mesh.layers`). Left out, walls do not count.
     progress
         Called with the name of each stage; the default logs it.
 
@@ -120,15 +118,22 @@ def generate(
         local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
         limits = _local_sizes(gmsh, shape, local)
         _check_count(gmsh, shape, chosen)
-        progress(f"meshing with elements of {chosen:g} mm")
         circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
         circle = circle if per_circle is None else per_circle
-        if layers is not None:
-            limits.append(_size_of_walls(gmsh, shape, chosen, circle, layers))
-        _set_smallest(gmsh, limits)
-        _divide(gmsh, chosen, circle, shape.dimension)
-        progress("curving")
-        return _named_mesh(gmsh, shape, _curved(gmsh, shape))
+
+        def meshed(*further: int) -> Mesh:
+            progress(f"meshing with elements of {chosen:g} mm")
+            _set_smallest(gmsh, [*limits, *further])
+            _divide(gmsh, chosen, circle, shape.dimension)
+            progress("curving")
+            return _named_mesh(gmsh, shape, _curved(gmsh, shape))
+
+        if layers is None:
+            return meshed()
+        check_layers(layers, shape.dimension)
+        progress("measuring walls")
+        _divide(gmsh, chosen, circle, 2)
+        return with_layers(gmsh, shape, chosen, layers, MOST_CELLS, meshed)
 
 
 def _structured(actuator: Actuator, size: float, sizes: Mapping[str, float] | None, per_circle: int | None) -> Mesh:
@@ -178,51 +183,6 @@ def _set_smallest(gmsh: ModuleType, limits: list[int]) -> None:
         smallest = field.add("Min")
         field.setNumbers(smallest, "FieldsList", limits)
         field.setAsBackgroundMesh(smallest)
-
-
-def _size_of_walls(gmsh: ModuleType, shape: Shape, size: float, per_circle: int, layers: int) -> int:
-    """Return a field that puts `layers` elements through each wall, from a first mesh of the skin."""
-    if shape.dimension != 3:
-        raise InputError("walls are measured in space only", key="layers", value=layers, expected="sizes instead")
-    if not (isinstance(layers, int) and layers >= 1):
-        raise InputError("the number of layers must be at least 1", key="layers", value=layers)
-    _divide(gmsh, size, per_circle, 2)
-    points, triangles = _skin(gmsh, shape)
-    wall = np.minimum(_EDGE_OF_LAYER * wall_thickness(points, triangles) / layers, size)
-    _check_walls(points[triangles], wall, layers)
-    view = gmsh.view.add("walls")
-    # A facet that reaches over to a thinner wall takes its size.
-    at_node = np.full(len(points), np.inf)
-    np.minimum.at(at_node, triangles, wall[:, None])
-    corners = points[triangles].transpose(0, 2, 1).reshape(len(triangles), 9)
-    gmsh.view.addListData(view, "ST", len(triangles), np.hstack([corners, at_node[triangles]]).ravel())
-    gmsh.model.mesh.clear()
-    field = gmsh.model.mesh.field.add("PostView")
-    gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
-    return int(field)
-
-
-def _skin(gmsh: ModuleType, shape: Shape) -> tuple[FloatArray, IntArray]:
-    """Return points and outward triangles of the skin's mesh."""
-    pairs = [(3, tag) for tags in shape.regions.values() for tag in tags]
-    skin = gmsh.model.getBoundary(pairs, combined=True, oriented=True)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    place = np.zeros(int(tags.max()) + 1, dtype=np.int32)
-    place[tags] = np.arange(len(tags))
-    blocks = []
-    for _, tag in skin:
-        nodes = gmsh.model.mesh.getElementsByType(_TRI3, abs(tag))[1].reshape(-1, 3)
-        blocks.append(place[nodes] if tag > 0 else place[nodes][:, ::-1])
-    return coordinates.reshape(-1, 3), np.vstack(blocks)
-
-
-def _check_walls(corners: FloatArray, size: FloatArray, layers: int) -> None:
-    """Refuse layers that would fill the memory: half of each wall belongs to the facets of either side."""
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    count = 8.5 * float((area * 0.5 * layers * size / size**3).sum())
-    if count > MOST_CELLS:
-        problem = f"so many layers need about {count:.1g} elements"
-        raise InputError(problem, key="layers", value=layers, expected=f"fewer: at most {MOST_CELLS:.0g} elements")
 
 
 def _check_count(gmsh: ModuleType, shape: Shape, size: float) -> None:

@@ -44,12 +44,14 @@ class MeshCase(StrictModel):
     size: PositiveLength | None = Field(default=None, description="edge length; left out, the template's own default")
     sizes: dict[str, PositiveLength] = Field(default={}, description="region or surface: smaller edge length there")
     per_circle: int | None = Field(
-        default=None, strict=True, ge=0, le=1000, description="elements along a full circle, at least"
+        default=None, strict=True, ge=0, le=1000, description="elements along a full circle, in tetrahedra about"
     )
     cells: Literal["tetrahedra", "hexahedra", "triangles", "quadrilaterals"] | None = Field(
         default=None, description="left out, tetrahedra or triangles; the others where the shape is made of blocks"
     )
-    layers: int | None = Field(default=None, strict=True, ge=1, le=20, description="elements through a wall, at least")
+    layers: int | None = Field(
+        default=None, strict=True, ge=1, le=20, description="elements through walls, at least, behind 95 % of the skin"
+    )
 
 
 class RegionCase(StrictModel):

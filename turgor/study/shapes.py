@@ -38,12 +38,12 @@ class _Meshed(Actuator):
         sizes
             Smaller edge lengths by the name of a region or surface.
         per_circle
-            Elements along a full circle, at least; left out, the template's own default.
+            Elements along a full circle, in tetrahedra about; left out, the template's own default.
         cells
             ``hexahedra`` or, of a section, ``quadrilaterals``, where the shape is made of blocks; left out, tetrahedra
             or triangles.
         layers
-            Elements through a wall, at least; left out, walls do not count.
+            Elements through the walls, at least, behind all but 5 % of the skin; left out, walls do not count.
 
         Raises
         ------
