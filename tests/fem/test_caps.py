@@ -132,6 +132,17 @@ def test_a_leak_is_said(quarter_tube):
         volume_field(**field, caps=part.caps)
 
 
+def test_a_cap_between_two_parallel_planes_of_symmetry_is_refused():
+    """The flat bottom of a channel along x that the planes y = 0 and y = 3 cut; its end at x = 2 is capped."""
+    block = box((2.0, 3.0, 4.0), (2, 2, 2))
+    rim = rim_edges(block.surface("z1"))
+    end = rim[(np.abs(block.points[rim, 0] - 2.0) < 1e-9).all(axis=1)]
+    with pytest.raises(
+        InputError, match=r"caps\.end: .* ends in two parallel symmetry planes across y; expected a model"
+    ):
+        volume_field(block.points, block.surface("z1"), "cavity", caps={"end": end})
+
+
 def test_a_force_and_a_pressure_both_count(open_box):
     system = system_of(open_box, "cavity", [Clamped("z0")], [Force("x1", (0.0, 0.0, 1.0))])
     assert len(system.cavities[0].caps) == 1

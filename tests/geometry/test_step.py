@@ -127,6 +127,13 @@ def test_rules_that_do_not_fit_the_part_are_refused(hollow, changes, message):
         generate(StepFile(**{"file": hollow, "mount": BOTTOM, **changes}), 4.0)
 
 
+def test_a_key_that_is_missing_is_named(hollow):
+    with pytest.raises(InputError, match=r"^mount: this key is missing$"):
+        StepFile(file=hollow)
+    with pytest.raises(InputError, match=r"^file: this key is missing \(also wrong: mount\)$"):
+        StepFile()
+
+
 def test_a_file_that_is_no_step_is_refused(tmp_path):
     path = tmp_path / "letter.step"
     path.write_text("Dear Sir or Madam")

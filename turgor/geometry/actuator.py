@@ -206,6 +206,8 @@ def _input_error(error: ValidationError, kind: type[Actuator]) -> InputError:
     if first["type"] == "extra_forbidden":
         expected = "one of: " + ", ".join(kind.model_fields)
         return InputError(f"'{kind.template}' has no such parameter{also}", key=key, expected=expected)
+    if first["type"] == "missing":
+        return InputError(f"this key is missing{also}", key=key)
     cause = first.get("ctx", {}).get("error")
     if first["type"] == "value_error" and cause is not None:
         return InputError(f"{cause}{also}", key=key)

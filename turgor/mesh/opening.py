@@ -147,9 +147,8 @@ def volume_field(
     if not axes.any():
         raise InputError("parallel planes close the cavity across every axis", key=name, expected="a closed surface")
     rim = (np.concatenate([np.empty(0, np.int32), *nodes]), np.concatenate([np.empty(0, np.int32), *across]))
-    planes_of = [level[0] if len(level) == 1 else None for level in planes]
     closing = [
-        _cap(points, whole[own], planes_of, tolerance, cap_name)
+        _cap(points, whole[own], planes, tolerance, cap_name)
         for cap_name, own in zip(caps or {}, capped, strict=True)
         if own.any()
     ]
@@ -163,7 +162,7 @@ def _own(edges: Ints, cap: Ints) -> NDArray[np.bool_]:
     return np.isin(keys[0], keys[1])
 
 
-def _cap(points: Floats, edges: Ints, planes: list[float | None], tolerance: float, name: str) -> Cap:
+def _cap(points: Floats, edges: Ints, planes: list[list[float]], tolerance: float, name: str) -> Cap:
     """Return the cap over the rim of these edges ``(e, 3)``: two ends, in the sense of the wall, and the middle.
 
     Where the rim ends, it must end in one of the symmetry `planes`, in which the middle of the cap then lies too.
@@ -174,20 +173,19 @@ def _cap(points: Floats, edges: Ints, planes: list[float | None], tolerance: flo
     length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
     share = np.bincount(local.ravel(), np.outer(length, [1.0, 1.0, 4.0]).ravel()) / (6.0 * length.sum())
     ends = nodes[np.bincount(local[:, :2].ravel(), minlength=len(nodes)) == 1]
-    held = [
-        level is not None and len(ends) > 0 and bool((np.abs(points[ends, axis] - level) <= tolerance).any())
-        for axis, level in enumerate(planes)
-    ]
-    on_plane = [
-        any(
-            flat and abs(points[node, axis] - level) <= tolerance
-            for axis, (flat, level) in enumerate(zip(held, planes, strict=True))
-            if level is not None
-        )
-        for node in ends
-    ]
-    if not all(on_plane):
-        place = points[ends[on_plane.index(False)]].round(3).tolist()
+    in_plane = np.zeros((len(ends), len(planes)), bool)
+    for axis, levels in enumerate(planes):
+        met = [np.abs(points[ends, axis] - level) <= tolerance for level in levels]
+        if sum(bool(some.any()) for some in met) > 1:
+            problem = f"the rim under the cap ends in two parallel symmetry planes across {'xyz'[axis]}"
+            expected = "a model that is cut once across this axis: the middle of a cap lies in one plane only"
+            raise InputError(problem, key=f"caps.{name}", expected=expected)
+        if len(levels) == 1:
+            in_plane[:, axis] = met[0]
+    held: NDArray[np.bool_] = np.any(in_plane, axis=0)
+    closed: NDArray[np.bool_] = np.any(in_plane, axis=1)
+    if not closed.all():
+        place = points[ends[int(np.argmin(closed))]].round(3).tolist()
         raise InputError(f"the rim under the cap ends near {place} mm", key=f"caps.{name}", expected="a closed rim")
     corners = np.unique(local[:, :2])
     n, half = len(nodes), np.full(len(nodes), -1)

@@ -30,6 +30,7 @@ _VTK_TYPES = {3: 21, 6: 22, 9: 28}
 
 PICTURE_EDGES: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "edge_opacity": 0.25}
 LINES: dict[str, Any] = {"line_width": 5}
+_BAR: dict[str, Any] = {"vertical": True, "position_x": 0.88, "position_y": 0.15, "width": 0.06, "height": 0.7}
 
 
 def save_picture(
@@ -75,8 +76,8 @@ def _draw(plotter: Any, mesh: Mesh, show: str, cut: bool) -> None:
         _draw_names(pyvista, plotter, mesh, cut)
     look(plotter, mesh, (0.5, -1.0, 0.45))
     extent = np.ptp(mesh.points, axis=0)
-    # A tall body fills the height already.
-    plotter.camera.zoom(1.3 if mesh.dimension == 3 and extent[2] < extent.max() else 1.0)
+    # A tall body fills the height already, up to the names of its ends.
+    plotter.camera.zoom(1.3 if mesh.dimension == 3 and extent[2] < extent.max() else 0.93)
 
 
 def _draw_quality(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
@@ -85,7 +86,9 @@ def _draw_quality(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
     hosts = np.arange(mesh.n_cells) if mesh.dimension == 2 else host_cells(mesh.cells, seen)
     skin = skin_of(pyvista, mesh, seen)
     skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[hosts]
-    plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), **PICTURE_EDGES)
+    plotter.add_mesh(
+        skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), scalar_bar_args=_BAR, ambient=0.5, **PICTURE_EDGES
+    )
     worst = in_space(measured.centres[measured.worst_cell][None])
     plotter.add_point_labels(worst, [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
 
