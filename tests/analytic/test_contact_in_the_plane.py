@@ -103,6 +103,28 @@ def hairpin(bend: float, wall: float, arm: float, n: int) -> Mesh:
     )
 
 
+def test_a_strip_folded_by_a_barrier_never_touches_itself():
+    # As below, and here the roller too comes to the arm through a gap.
+    pytest.importorskip("ipctk")
+    mesh = hairpin(1.0, 0.6, 4.0, 3)
+    roller, table = Sphere((1.0, 4.61), 3.0), Plane((0.0, -1.61), (0.0, 1.0))
+    contact = [
+        SelfContact(method="barrier"),
+        RigidContact(roller, "outer", motion=(0.0, -2.11), label="roller", method="barrier"),
+        RigidContact(table, "outer", label="table", method="barrier"),
+    ]
+    material, supports = {"body": neo_hookean(0.1, 100.0)}, [Clamped("low")]
+    system = System(mesh, material, supports, section=PlaneStrain(), contact=contact)
+    for found in solve_path(system, [0.5, 1.0]):
+        assert not any(term.intersects(found.state) for term in system.contacts)
+    own, roller, table = system.touches(found.state)
+    assert own.area > 1.0
+    assert 0.0 < own.gap < 0.01 * 0.6
+    assert roller.force[1] > 0.01
+    reaction = system.body_part(system.forces(found.state)[0])[mesh.surface_nodes("low")].sum(axis=0)
+    np.testing.assert_allclose(np.add(roller.force, table.force)[:2], reaction, atol=1e-6 * roller.force[1])
+
+
 def test_a_folded_strip_closes_on_itself():
     # A roller presses one arm of a hairpin on the other, 0.1 mm farther than they need to meet.
     mesh = hairpin(1.0, 0.6, 4.0, 3)

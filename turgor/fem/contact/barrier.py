@@ -308,7 +308,9 @@ class Barrier(Unlagged):
             return wanted
         if gap < SMALLEST_REACH * wanted / BELOW_REST:
             raise InputError(
-                "surfaces intersect at rest" if crossing else "surfaces lie too near each other at rest for a barrier",
+                "surfaces touch or intersect at rest"
+                if crossing
+                else "surfaces lie too near each other at rest for a barrier",
                 key="contact",
                 value=f"{self.name}: {gap:.3g} mm apart",
                 expected=f"a gap of {SMALLEST_REACH * wanted / BELOW_REST:.2g} mm or more, or method: penalty",
