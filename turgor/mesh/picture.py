@@ -76,8 +76,9 @@ def _draw(plotter: Any, mesh: Mesh, show: str, cut: bool) -> None:
         _draw_names(pyvista, plotter, mesh, cut)
     look(plotter, mesh, (0.5, -1.0, 0.45))
     extent = np.ptp(mesh.points, axis=0)
-    # A tall body fills the height already, up to the names of its ends.
-    plotter.camera.zoom(1.3 if mesh.dimension == 3 and extent[2] < extent.max() else 0.93)
+    # A tall body fills the height already, up to the names of its ends; beside a long one stands the scale of quality.
+    long = 1.1 if show == "quality" else 1.3
+    plotter.camera.zoom(long if mesh.dimension == 3 and extent[2] < extent.max() else 0.93)
 
 
 def _draw_quality(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
