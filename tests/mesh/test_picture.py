@@ -1,13 +1,15 @@
 from functools import partial
+from unittest.mock import MagicMock
 
 import matplotlib.image
 import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
+from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.named_parts import save_named_parts
-from turgor.mesh.picture import save_picture
+from turgor.mesh.picture import add_edges, save_picture
 from turgor.mesh.structured import box, rectangle
 
 
@@ -43,3 +45,15 @@ def test_every_kind_of_cell_is_drawn(kind, show, tmp_path):
 def test_only_png(block, tmp_path):
     with pytest.raises(InputError, match=r"saved as \.png"):
         save_picture(block, tmp_path / "block.jpg")
+
+
+@pytest.mark.parametrize(("cell", "edges"), [("hex27", 12), ("tet10", 18)])
+def test_edges_are_those_of_the_elements(cell, edges):
+    block = box((1.0, 1.0, 1.0), (1, 1, 1), cell)
+    plotter = MagicMock()
+    add_edges(plotter, block, boundary_faces(block.cells))
+    # Twelve edges of a cube, and a diagonal on each side of one made of tetrahedra: each once, through its middle.
+    (drawn,) = plotter.add_mesh.call_args.args
+    assert drawn.n_lines == edges
+    for start, middle, end in drawn.lines.reshape(-1, 4)[:, 1:]:
+        np.testing.assert_allclose(block.points[middle], 0.5 * (block.points[start] + block.points[end]))

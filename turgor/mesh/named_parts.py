@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from turgor.common.optional import require
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.picture import LINES, PICTURE_EDGES, colour_of, drawing, look, skin_of
+from turgor.mesh.picture import PICTURE_EDGES, add_edges, add_surface, colour_of, drawing, look, skin_of
 from turgor.mesh.tet10 import FloatArray, IntArray
 
 _ABOVE, _BELOW = (0.6, -1.0, 0.5), (-0.6, 1.0, -0.5)
@@ -94,11 +94,10 @@ def _look(plotter: Any, mesh: Mesh, view: tuple[float, float, float]) -> None:
 
 
 def _add_surfaces(plotter: Any, mesh: Mesh) -> None:
-    pyvista, colours = require("pyvista"), _surface_colours(mesh)
-    look_of = PICTURE_EDGES if mesh.dimension == 3 else LINES
+    colours = _surface_colours(mesh)
     for name, faces in mesh.surfaces.items():
         if len(faces):
-            plotter.add_mesh(skin_of(pyvista, mesh, faces), color=colours[name], label=name, **look_of)
+            add_surface(plotter, mesh, faces, color=colours[name], label=name)
 
 
 def _add_caps(plotter: Any, mesh: Mesh) -> None:
@@ -117,5 +116,8 @@ def _add_regions(plotter: Any, mesh: Mesh) -> None:
     for number, (name, cells) in enumerate(mesh.regions.items()):
         kept: IntArray = mesh.cells[cells[behind[cells]]]
         if len(kept):
-            skin = skin_of(require("pyvista"), mesh, kept if flat else boundary_faces(kept))
-            plotter.add_mesh(skin, color=_REGIONS[number % len(_REGIONS)], label=name, **PICTURE_EDGES)
+            seen = kept if flat else boundary_faces(kept)
+            plotter.add_mesh(
+                skin_of(require("pyvista"), mesh, seen), color=_REGIONS[number % len(_REGIONS)], label=name
+            )
+            add_edges(plotter, mesh, seen)

@@ -87,25 +87,23 @@ def _draw_quality(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
     hosts = np.arange(mesh.n_cells) if mesh.dimension == 2 else host_cells(mesh.cells, seen)
     skin = skin_of(pyvista, mesh, seen)
     skin.cell_data["scaled Jacobian"] = measured.scaled_jacobian[hosts]
-    plotter.add_mesh(
-        skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), scalar_bar_args=_BAR, ambient=0.5, **PICTURE_EDGES
-    )
+    plotter.add_mesh(skin, scalars="scaled Jacobian", cmap="RdYlGn", clim=(0, 1), scalar_bar_args=_BAR, ambient=0.5)
+    add_edges(plotter, mesh, seen)
     worst = in_space(measured.centres[measured.worst_cell][None])
     plotter.add_point_labels(worst, [f"worst {measured.scaled_jacobian.min():.2f}"], always_visible=True)
 
 
 def _draw_names(pyvista: Any, plotter: Any, mesh: Mesh, cut: bool) -> None:
     if mesh.dimension == 2:
-        plotter.add_mesh(skin_of(pyvista, mesh, mesh.cells), color="#e8eaed", **PICTURE_EDGES)
+        plotter.add_mesh(skin_of(pyvista, mesh, mesh.cells), color="#e8eaed")
+        add_edges(plotter, mesh, mesh.cells)
     for name, faces in mesh.surfaces.items():
         kept = _beyond(mesh, faces, cut)
         if len(kept):
             # Fibres run inside the wall; they show through the outside.
             opacity = 0.3 if mesh.curves and name == "outer" else 1.0
-            look_of = PICTURE_EDGES if mesh.dimension == 3 else LINES
-            plotter.add_mesh(
-                skin_of(pyvista, mesh, kept), color=colour_of(name) or "#aaaaaa", label=name, opacity=opacity, **look_of
-            )
+            options = {"color": colour_of(name) or "#aaaaaa", "label": name, "opacity": opacity}
+            add_surface(plotter, mesh, kept, **options)
     _add_lines(pyvista, plotter, mesh)
     plotter.add_legend(bcolor="white", size=(0.16, 0.2))
 
@@ -129,6 +127,36 @@ def skin_of(pyvista: Any, mesh: Mesh, faces: IntArray) -> Any:
     n = faces.shape[1]
     cells = np.hstack([np.full((len(faces), 1), n), faces]).ravel()
     return pyvista.UnstructuredGrid(cells, np.full(len(faces), _VTK_TYPES[n]), in_space(mesh.points))
+
+
+def add_surface(plotter: Any, mesh: Mesh, faces: IntArray, **options: Any) -> None:
+    """Draw faces of a mesh, with the edges of their elements if opaque; of a plane mesh edges as thick lines."""
+    if mesh.dimension == 2:
+        plotter.add_mesh(skin_of(require("pyvista"), mesh, faces), **options, **LINES)
+    else:
+        plotter.add_mesh(skin_of(require("pyvista"), mesh, faces), **options)
+        if options.get("opacity", 1.0) == 1.0:
+            add_edges(plotter, mesh, faces)
+
+
+def add_edges(plotter: Any, mesh: Mesh, faces: IntArray) -> None:
+    """Draw the curved edges of faces; VTK, asked for edges, also draws those of the flat pieces it cuts faces into."""
+    corners = 3 if faces.shape[1] == 6 else 4
+    start = np.arange(corners)
+    chain = np.stack([faces[:, start], faces[:, corners + start], faces[:, (start + 1) % corners]], axis=2)
+    chain = np.unique(_ascending(chain.reshape(-1, 3)), axis=0)
+    lines = np.column_stack([np.full(len(chain), 3), chain]).ravel()
+    drawn = require("pyvista").PolyData(in_space(mesh.points), lines=lines)
+    actor = plotter.add_mesh(drawn, color="black", line_width=1, opacity=0.35, lighting=False)
+    # The lines lie in the faces: drawn as if a little nearer, they are seen.
+    actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -30.0)
+
+
+def _ascending(chain: IntArray) -> IntArray:
+    """Return chains of three nodes so that each begins at the lower end."""
+    turned: IntArray = np.where((chain[:, :1] > chain[:, 2:]), chain[:, ::-1], chain)
+    return turned
 
 
 def _add_lines(pyvista: Any, plotter: Any, mesh: Mesh) -> None:
