@@ -1,92 +1,193 @@
-"""The trends that the PneuNet geometry study reports, on coarse meshes of a shorter finger.
+"""The PneuNet geometry study: the finger to 50 kPa, the force of its blocked tip, and every trend that it reports.
 
-    .venv/bin/python benchmarks/studies/pneunet.py
+    .venv/bin/python benchmarks/studies/pneunet.py [--only NAME …] [--size 3]
 
-Prints one table in Markdown: a variant, the bending angle of the free finger, and the force on a rod under its tip that
-blocks it. Half of a finger of three chambers in Dragon Skin 30; self-contact where the gap is narrow, for chambers 2 mm
-apart do not meet below 50 kPa. The study does not print its layers and number of chambers: compare directions.
+Prints Markdown: of the finger of eight chambers bending angle and tip force by pressure (`--only published`), and a
+table of variants of a finger of three. Halves in Dragon Skin 30 unless said otherwise, chambers free to meet; the force
+of the half is doubled. The study does not print its layers, its number of chambers and where its dynamometer lies: here
+it is a plate under the finger, touching it or 8 mm below. Compare directions.
 """
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import turgor as tg
-from turgor.materials import Hyperelastic
 from turgor.materials.library import get
+from turgor.solver.path import PathOptions
 
-FREE, BLOCKED = "40 kPa", "20 kPa"
-BASE = {"chambers": 3}
-RUBBER = "dragon-skin-30-yeoh"
-VARIANTS: list[tuple[str, dict[str, object], str]] = [
-    ("as printed, three chambers", {}, RUBBER),
-    ("gap 0.5 mm", {"gap": "0.5 mm"}, RUBBER),
-    ("gap 3 mm", {"gap": "3 mm"}, RUBBER),
-    ("wall 1.5 mm", {"wall": "1.5 mm"}, RUBBER),
-    ("side and top wall 1.5 mm", {"side_wall": "1.5 mm", "top_wall": "1.5 mm"}, RUBBER),
-    ("first layer 3 mm", {"first_layer": "3 mm"}, RUBBER),
-    ("second layer none", {"second_layer": "0 mm"}, RUBBER),
-    ("four chambers", {"chambers": 4}, RUBBER),
-    ("chamber height 10 mm", {"chamber_height": "10 mm"}, RUBBER),
-    ("chamber width 8 mm", {"chamber_width": "8 mm"}, RUBBER),
-    ("half-round section", {"cross_section": "half-round"}, RUBBER),
-    ("triangular section", {"cross_section": "triangle"}, RUBBER),
-    ("paper under the first layer", {}, RUBBER),
-    ("Ecoflex 00-30", {}, "ecoflex-00-30-yeoh"),
-    ("RTV 615", {}, "rtv615-yeoh"),
-    ("TPU", {}, "tpu-0deg-mooney-rivlin-2"),
-]
+FULL = 50.0
+"""The study's pressure, kPa."""
+TOUCHING, BELOW = 0.01, 8.0
+"""How far the plate lies under the finger, mm."""
+
+CLEAR = 0.02
+"""A difference smaller than this part is none."""
+
+PUBLISHED = "published"
 
 
-def rod(finger: tg.PneuNet) -> dict[str, object]:
-    """Return a dynamometer: a rod across the finger, just under the bottom of its tip."""
-    x, radius = finger.length - 2.0, 3.0
-    ends = [[f"{x} mm", f"{y} mm", f"{-radius - 0.01} mm"] for y in (-50, 50)]
-    body = {"type": "cylinder", "name": "rod", "start": ends[0], "end": ends[1], "radius": f"{radius} mm"}
-    return {"bodies": [{**body, "surface": "outer"}]}
+@dataclass(frozen=True)
+class Variant:
+    """A finger that differs from the first, which way the study says that bending and tip force change, and its load.
+
+    `full` is the pressure that it is inflated to, kPa, in so many `steps`.
+    """
+
+    name: str
+    bending: str = "–"
+    force: str = "–"
+    changes: Mapping[str, object] = field(default_factory=dict)
+    rubber: str = "dragon-skin-30-yeoh"
+    paper_layer: bool = False
+    full: float = FULL
+    steps: int = 2
 
 
-def sheets(name: str) -> list[dict[str, object]]:
-    if not name.startswith("paper"):
-        return []
-    return [{"between": ["body", "base"], "youngs_modulus": "2 GPa", "thickness": "0.1 mm"}]
+BASE = Variant("as printed, three chambers")
+VARIANTS = (
+    Variant("gap 0.5 mm", "more", changes={"gap": "0.5 mm"}),
+    Variant("gap 3 mm", "less", changes={"gap": "3 mm"}),
+    Variant("wall 1.5 mm", "more", "less", {"wall": "1.5 mm"}),
+    Variant("wall 2.5 mm", "less", "more", {"wall": "2.5 mm"}),
+    Variant("side wall 1.5 mm", "more", changes={"side_wall": "1.5 mm"}),
+    Variant("top wall 1.5 mm", changes={"top_wall": "1.5 mm"}),
+    Variant("all walls 1.5 mm", "more", "less", {"wall": "1.5 mm", "side_wall": "1.5 mm", "top_wall": "1.5 mm"}),
+    Variant("first layer 3 mm", "less", "more", {"first_layer": "3 mm"}),
+    Variant("no second layer", "more", "less", {"second_layer": "0 mm"}),
+    Variant("four chambers", "more", "more", {"chambers": 4}),
+    Variant("six chambers", "more", "more", {"chambers": 6}),
+    Variant("chamber height 10 mm", changes={"chamber_height": "10 mm"}),
+    Variant("chamber width 8 mm", changes={"chamber_width": "8 mm"}),
+    Variant("triangular section", "less", changes={"cross_section": "triangle"}),
+    Variant("half-round section", changes={"cross_section": "half-round"}),
+    Variant("paper under the first layer", paper_layer=True, steps=10),
+    Variant("RTV 615", rubber="rtv615-yeoh"),
+    Variant("Ecoflex 00-30, to its limit", "more", "less", rubber="ecoflex-00-30-yeoh", full=8.0, steps=8),
+    Variant("TPU", "least", "least", rubber="tpu-0deg-mooney-rivlin-2"),
+)
 
 
-def last(name: str, finger: tg.PneuNet, rubber: Hyperelastic, pressure: str, contact: object) -> tuple[tg.Path, str]:
-    """Inflate as far as it goes; return the states and the note that tells if that is not the whole way."""
-    states: list[tg.Path] = []
+@dataclass(frozen=True)
+class Found:
+    """What a variant does as far as it goes: bending angle in °, contact in mm², forces in N, pressures in kPa."""
+
+    bending: float
+    contact: float
+    touching: float
+    below: float
+    reached: tuple[float, float, float]
+    elements: int
+
+
+def finger(variant: Variant, chambers: int = 3) -> tg.PneuNet:
+    return tg.PneuNet(**{"chambers": chambers, **variant.changes}, symmetric=True)
+
+
+def inflated(variant: Variant, shape: tg.PneuNet, size: str, plate: float | None = None) -> tg.Path:
+    """Inflate as far as it goes, free or above a plate so many mm under the bottom."""
+    under = {"type": "plane", "name": "plate", "point": ["0 mm", "0 mm", f"{-(plate or 0.0)} mm"], "normal": [0, 0, 1]}
+    sheet = {"between": ["body", "base"], "youngs_modulus": "2 GPa", "thickness": "0.1 mm"}
     model = tg.Model(
-        finger.mesh(size="4 mm"),
-        contact=contact,
-        sheets=sheets(name),
+        shape.mesh(size=size),
+        contact={"self": True, "bodies": [] if plate is None else [{**under, "surface": "outer"}]},
+        sheets=[sheet] if variant.paper_layer else [],
         measures=["bending_angle", "tip_position"],
-        body=rubber,
+        body=get(variant.rubber),
     )
-    try:
-        model.inflate(pressure, steps=1, on_step=states.append)
-    except tg.SolverError:
-        return states[-1], f" (to {states[-1].pressure.magnitude[-1]:.3g} kPa)"
-    return states[-1], ""
+    states: list[tg.Path] = []
+    with contextlib.suppress(tg.SolverError):
+        model.inflate(
+            f"{variant.full} kPa", steps=variant.steps, on_step=states.append, options=PathOptions(smallest_step=1e-3)
+        )
+    return states[-1]
+
+
+def force(path: tg.Path, row: int = -1) -> float:
+    """Return what the plate feels, N: half of the finger presses half as much."""
+    return 2.0 * float(path.history[row]["contact_plate_force_N"])
+
+
+def measured(variant: Variant, size: str) -> Found:
+    shape = finger(variant)
+    free, touching, below = (inflated(variant, shape, size, plate) for plate in (None, TOUCHING, BELOW))
+    return Found(
+        bending=float(free.bending_angle.magnitude[-1]),
+        contact=float(free.history[-1]["contact_self_area_mm2"]),
+        touching=force(touching),
+        below=force(below),
+        reached=tuple(float(path.pressure.magnitude[-1]) for path in (free, touching, below)),
+        elements=free.mesh.n_cells,
+    )
+
+
+def published(size: str) -> None:
+    """Print the finger of eight chambers, free and blocked, by pressure."""
+    begun = time.perf_counter()
+    shape = finger(BASE, chambers=8)
+    free, blocked = (inflated(replace(BASE, steps=5), shape, size, plate) for plate in (None, TOUCHING))
+    print("| pressure, kPa | bending, ° | contact, mm² | blocked: tip force, N | contact, mm² |\n|---|---|---|---|---|")
+    for k, (one, other) in enumerate(zip(free.history, blocked.history, strict=False)):
+        print(
+            f"| {one['pressure_kPa']:.3g} | {one['bending_angle_deg']:.1f} | {one['contact_self_area_mm2']:.1f} | "
+            f"{force(blocked, k):.3f} | {other['contact_self_area_mm2']:.1f} |"
+        )
+    print(f"\n{free.mesh.n_cells} elements, {time.perf_counter() - begun:.0f} s\n", flush=True)
+
+
+def change(value: float, base: float, reached: float) -> str:
+    """Say which way a value changes; what was not carried to the full pressure says nothing."""
+    if reached < 0.99 * FULL:
+        return "?"
+    return "same" if abs(value - base) <= CLEAR * abs(base) else "more" if value > base else "less"
+
+
+def cell(value: float, reached: float, digits: int) -> str:
+    return f"{value:.{digits}f}" + ("" if reached >= 0.999 * FULL else f" (at {reached:.3g} kPa)")
+
+
+def trends(variants: list[Variant], size: str) -> None:
+    """Print the table of variants against the first."""
+    print("| variant | bending, ° | contact, mm² | force, plate touching, N | plate 8 mm below, N | paper | ours | s |")
+    print("|---|---|---|---|---|---|---|---|")
+    base: Found | None = None
+    for variant in [BASE, *variants]:
+        begun = time.perf_counter()
+        found = measured(variant, size)
+        free, touching, below = found.reached
+        base = base or found
+        ours = [
+            change(found.bending, base.bending, free),
+            change(found.touching, base.touching, touching),
+            change(found.below, base.below, below),
+        ]
+        forces = f"{cell(found.touching, touching, 3)} | {cell(found.below, below, 3)}"
+        print(
+            f"| {variant.name} | {cell(found.bending, free, 1)} | {found.contact:.1f} | {forces} | "
+            f"{variant.bending}, {variant.force} | {', '.join(ours)} | {time.perf_counter() - begun:.0f} |",
+            flush=True,
+        )
 
 
 def main() -> None:
-    print(f"| variant | bending at {FREE}, ° | contact, mm² | tip force at {BLOCKED}, N | elements | time, s |")
-    print("|---|---|---|---|---|---|")
-    for name, changes, rubber in VARIANTS:
-        begun = time.perf_counter()
-        finger = tg.PneuNet(**{**BASE, **changes}, symmetric=True)
-        material = get(rubber)
-        free, note = last(name, finger, material, FREE, finger.gap < 2.0)
-        blocked, short = last(name, finger, material, BLOCKED, rod(finger))
-        # Half of the finger feels half of the force.
-        force = 2.0 * blocked.history[-1]["contact_rod_force_z_N"]
-        area = free.history[-1].get("contact_self_area_mm2", 0.0)
-        wall = time.perf_counter() - begun
-        print(
-            f"| {name} | {free.bending_angle.magnitude[-1]:.1f}{note} | {area:.1f} | {abs(force):.3f}{short} | "
-            f"{free.mesh.n_cells} | {wall:.0f} |",
-            flush=True,
-        )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", action="append", help=f"'{PUBLISHED}' or the name of a variant; may be repeated")
+    parser.add_argument("--size", default="3", help="element size, mm")
+    chosen = parser.parse_args()
+    names = [PUBLISHED, *(variant.name for variant in VARIANTS)]
+    unknown = set(chosen.only or ()) - set(names)
+    if unknown:
+        parser.error(f"there is no {', '.join(sorted(unknown))}; expected some of: {', '.join(names)}")
+    wanted = chosen.only or names
+    if PUBLISHED in wanted:
+        published(f"{chosen.size} mm")
+    variants = [variant for variant in VARIANTS if variant.name in wanted]
+    if variants:
+        trends(variants, f"{chosen.size} mm")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The bellows and the honeycomb of the two papers, as the examples have them, on coarse meshes."""
+"""The bellows, membrane, PneuNet and honeycomb of the papers, as the examples have them, on coarse meshes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from turgor.study.run import run
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
+ONE_STEP = {"membrane": ["solver.outputs=[172 kPa]"]}
+"""How an example is told to store its full load only, where it is not by the number of its steps."""
+
 Final = Callable[..., dict[str, Any]]
 
 
 @pytest.fixture
 def final(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Final:
-    """Run an example with changes, without contact and report, to its full load."""
+    """Run an example with changes, without report, to its full load."""
     monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
 
     def result(name: str, *changes: str) -> dict[str, Any]:
-        case = load_case(EXAMPLES / f"{name}.yaml", ["solver.steps=1", *changes])
+        case = load_case(EXAMPLES / f"{name}.yaml", [*ONE_STEP.get(name, ["solver.steps=1"]), *changes])
         done = run(case, tmp_path / str(len(list(tmp_path.iterdir()))))
         assert done.summary["outcome"] == "target-reached"
         values: dict[str, Any] = done.summary["final"]
@@ -46,3 +49,26 @@ def test_the_honeycomb_moves_as_far_as_in_the_paper_and_less_with_thick_walls(fi
     paper, thick = (final("honeycomb", "mesh.size=4 mm", f"geometry.thickness={wall} mm") for wall in (1, 2))
     assert paper["max_displacement_mm"] == pytest.approx(29.49, rel=0.1)
     assert thick["max_displacement_mm"] < 0.5 * paper["max_displacement_mm"]
+
+
+def test_a_short_membrane_rises_less_by_five_constants_than_by_three(final: Final) -> None:
+    short = ("mesh.layers=1", "geometry.chamber_length=8 mm")
+    five, three = (
+        final("membrane", f"materials.body.library=tpu-0deg-mooney-rivlin-{number}", *short)["tip_displacement_mm"][2]
+        for number in (5, 3)
+    )
+    # 0.130 mm with three elements through the membrane; meshes of one, two and three scatter by 10 %.
+    assert five == pytest.approx(0.130, rel=0.1)
+    # The ratio scatters less: 1.56 in the section, four elements through the membrane.
+    assert three / five == pytest.approx(1.56, rel=0.03)
+
+
+def test_the_pneunet_bends_more_with_a_narrow_gap_whose_walls_meet(final: Final) -> None:
+    wide, narrow = (
+        final("pneunet", "geometry.chambers=3", f"geometry.gap={gap} mm", "mesh.size=4 mm") for gap in (2, 0.5)
+    )
+    # 52.7° on 3 mm elements (benchmarks/studies/pneunet.py).
+    assert wide["bending_angle_deg"] == pytest.approx(52.7, rel=0.02)
+    assert narrow["contact_self_area_mm2"] > 1.0
+    assert narrow["contact_self_overlap_per_wall"] < 0.01
+    assert narrow["bending_angle_deg"] > 1.02 * wide["bending_angle_deg"]

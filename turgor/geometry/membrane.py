@@ -34,7 +34,7 @@ class Membrane(Actuator):
     template: ClassVar[str] = "membrane"
 
     segments: int = parameter(7, "number of chambers; 1 is the T-shaped piece that was simulated", _THESIS, ge=1, le=40)
-    chamber_width: PositiveLength = parameter("2.5 mm", "chamber along x", "assumed, from the measured deflection")
+    chamber_width: PositiveLength = parameter("2.5 mm", "chamber along x", _ASSUMED)
     chamber_length: PositiveLength = parameter("20 mm", "chamber along y", _ASSUMED)
     spacing: PositiveLength = parameter("2 mm", "solid between two chambers", _ASSUMED)
     border: PositiveLength = parameter("3 mm", "solid around the chambers", _ASSUMED)
