@@ -57,10 +57,10 @@ def test_a_short_membrane_rises_less_by_five_constants_than_by_three(final: Fina
         final("membrane", f"materials.body.library=tpu-0deg-mooney-rivlin-{number}", *short)["tip_displacement_mm"][2]
         for number in (5, 3)
     )
-    # 0.130 mm with three elements through the membrane; meshes of one, two and three scatter by 10 %.
-    assert five == pytest.approx(0.130, rel=0.1)
+    # 0.142 mm with two elements through the membrane; one is softer.
+    assert five == pytest.approx(0.142, rel=0.08)
     # The ratio scatters less: 1.56 in the section, four elements through the membrane.
-    assert three / five == pytest.approx(1.56, rel=0.03)
+    assert three / five == pytest.approx(1.56, rel=0.04)
 
 
 def test_the_pneunet_bends_more_with_a_narrow_gap_whose_walls_meet(final: Final) -> None:
