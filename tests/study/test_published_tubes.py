@@ -42,8 +42,11 @@ def test_the_reinforced_tube_bends_towards_its_band_and_ever_faster(tmp_path: Pa
         "reinforced-tube", tmp_path, "0.25 bar", ["0.10 bar", "0.25 bar"], geometry=short, mesh={"size": "6 mm"}
     )
     turned = found["bending_angle_deg"]
-    # The paper's chord turns by 28.79° over a cavity of 100 mm, and the end face by twice as much.
-    assert turned[-1] == pytest.approx(2.0 * 28.79 * 30.0 / 100.0, rel=0.3)
+    # 21.24° with elements of 4 mm.
+    assert turned[-1] == pytest.approx(21.24, rel=0.03)
+    # The paper's chord turns by 28.79° over a cavity of 100 mm, the end face by twice as much; of the short tube the
+    # caps, which bend a little too, are a larger part.
+    assert 1.0 < turned[-1] / (2.0 * 28.79 * 30.0 / 100.0) < 1.25
     assert turned[-1] > 2.8 * turned[0], "it grows faster than the pressure, 2.5 times"
     assert found["tip_displacement_x_mm"][-1] < 0.0
     assert np.all(np.abs(found["tip_displacement_y_mm"]) < 1e-9)
@@ -61,5 +64,8 @@ def test_the_tilted_fibres_bend_and_twist_the_tube_ever_faster(tmp_path: Path) -
     )
     bending, twist = found["bending_angle_deg"], found["twist_deg"]
     assert bending[-1] > 2.0 * bending[-2] > 0.0
+    # 11.16° and −7.52° with elements of 9 mm, twelve around.
+    assert bending[-1] == pytest.approx(11.16, rel=0.05)
+    assert twist[-1] == pytest.approx(-7.52, rel=0.15)
     # Fibres wound anticlockwise coil the tube clockwise, seen from the mount.
     assert twist[-1] < 2.0 * twist[-2] < 0.0
