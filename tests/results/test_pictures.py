@@ -97,6 +97,15 @@ def test_the_camera_sees_every_point_from_the_side_of_the_motion(turn: int) -> N
     assert np.argmax(np.abs(camera.towards)) == camera.side
 
 
+@pytest.mark.parametrize(("start", "sense"), [(0.0, -1.0), (-2.0, 1.0)], ids=["a half", "a whole"])
+def test_the_camera_looks_into_a_half_from_its_cut(start: float, sense: float) -> None:
+    points = np.random.default_rng(0).uniform(0.0, 1.0, (50, 3)) * [4.0, 30.0, 50.0]
+    points[0, 0] = 0.0
+    camera = camera_for(points + np.array([start, 0.0, 0.0]), aspect=4 / 3)
+    assert camera.side == 0
+    assert np.sign(camera.towards[0]) == sense
+
+
 def test_the_outside_leaves_the_cavity_out(finger: Mesh) -> None:
     faces = outside_faces(finger)
     named = np.concatenate([finger.surfaces[name] for name in ("mount", "tip-face", "outer")])

@@ -14,6 +14,9 @@ AZIMUTH, ELEVATION = float(np.radians(28.0)), float(np.radians(18.0))
 
 _MARGIN = 1.08
 
+_IN_PLANE = 1e-6
+"""A body begins in a plane if its distance is no more than this part of its extent."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -44,7 +47,8 @@ def camera_for(points: FloatArray, aspect: float, side: int | None = None) -> Ca
     """Return the camera that sees all `points` ``(n, 3)`` in a picture of width/height `aspect`.
 
     It looks from the side at the plane of the motion, turned and raised a little so that depth shows; straight at a
-    body that is flat. Up is z, or y where z is the direction it looks along.
+    body that is flat. Up is z, or y where z is the direction it looks along. Into a body cut by the plane x = 0 it
+    looks from the cut.
 
     Parameters
     ----------
@@ -60,7 +64,8 @@ def camera_for(points: FloatArray, aspect: float, side: int | None = None) -> Ca
     azimuth, elevation = (AZIMUTH, ELEVATION) if extents[side] > 0.0 else (0.0, 0.0)
     vertical = np.eye(3)[1 if side == 2 else 2]
     # Looking along +y with z up (and along −x or −z alike) leaves the first in-plane axis pointing right.
-    facing = np.eye(3)[side] * (-1.0 if side == 1 else 1.0)
+    from_cut = side == 0 and abs(points[:, 0].min()) <= _IN_PLANE * extents[0]
+    facing = np.eye(3)[side] * (-1.0 if side == 1 or from_cut else 1.0)
     across = np.cross(vertical, facing)
     level = np.cos(azimuth) * facing + np.sin(azimuth) * across
     towards = np.cos(elevation) * level + np.sin(elevation) * vertical
