@@ -169,7 +169,7 @@ def cracked(mesh):
 
 
 REPAIRED = {
-    "small holes": (lambda body: binary(without(body, [3, 40, 90, 170])), "holes are filled"),
+    "small holes": (lambda body: binary(without(body, [3, 40, 90, 170])), "small holes are filled"),
     "flipped facets": (lambda body: binary(flipped(body)), "facets are turned to agree"),
     "duplicate shells": (lambda body: binary(np.vstack([facets_of(body)] * 2)), "facets that are there twice"),
     "facets without area": (
@@ -209,7 +209,7 @@ def test_a_small_hole_of_many_sides_is_filled(tmp_path, caplog):
     (tmp_path / "ball.stl").write_bytes(binary(without(ball, around)))
     with caplog.at_level(logging.WARNING, "turgor"):
         surface = read_surface(tmp_path / "ball.stl", "mm")
-    assert "1 holes are filled with 4 facets" in caplog.text
+    assert "small holes are filled: 1, facets: 4" in caplog.text
     assert surface.extent[0] == pytest.approx(ball.volume, rel=1e-3)
 
 

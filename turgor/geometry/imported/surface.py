@@ -234,7 +234,7 @@ def _filled(points: Floats, triangles: Ints, solid: Ints, path: str | Path) -> t
             raise BrokenSurfaceError(error, points, triangles, wrong)
     filled = _fill_with_vtk(points, triangles, size)
     new = filled[len(triangles) :]
-    LOG.warning("%s: %d holes are filled with %d facets", path, count, len(new))
+    LOG.warning("%s: small holes are filled: %d, facets: %d", path, count, len(new))
     if (edges_of(filled)[1] != 2).any():
         raise InputError("a hole of the surface cannot be filled", expected="a watertight surface")
     touched = {int(node): int(solid[row]) for row in range(len(triangles)) for node in triangles[row]}
