@@ -14,6 +14,7 @@ from turgor.fem.system import System
 from turgor.solver.control import ArcLength, Quantity, Volume
 from turgor.solver.linear import make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+from turgor.solver.prediction import predicted
 from turgor.solver.stops import StoppedShortError, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import LimitPoint, VolumeWalk
@@ -202,10 +203,9 @@ class _Arc:
         guess, aim = here.state, here.fraction + length * float(self.direction[1])
         if before is not None:
             reach = length / float(np.linalg.norm(self._way(here, before)))
-            reach *= walk.system.longest_step(here.state, reach * (here.state.u - before.state.u))
-            predicted = here.state.beyond(before.state, reach)
-            if walk.system.worst_jacobian(predicted.u)[0] > 0.0:
-                guess, aim = predicted, here.fraction + reach * (here.fraction - before.fraction)
+            guess, part = predicted(walk.system, (-1.0, 0.0), (before.state, here.state), reach)
+            if part > 0.0:
+                aim = here.fraction + part * reach * (here.fraction - before.fraction)
         control = ArcLength(walk.measure(here), here.fraction, self.scale, 1.0, length, walk.quantity.weights)
         found = find_equilibrium(walk.system, walk.linear, guess, aim, walk.options, control=control)
         return found if found.compliance is not None else walk.with_compliance(found)

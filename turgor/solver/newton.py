@@ -128,8 +128,7 @@ LOST = 20
 LOSSES = 2
 """So is one that has met so many tangents with more than so many negative pivots: its steps lead nowhere.
 
-Of 671 iterations that converged (tests of the solver and against closed forms) four met a single one of them; of those
-that did not, half met two.
+Where an iteration converges, hardly more than its first tangent, at a prediction far off, has so many.
 """
 
 NEAR = 1e-2

@@ -19,7 +19,7 @@ from turgor.solver.events import Event
 from turgor.solver.limits import after_snap
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
-from turgor.solver.prediction import extrapolated
+from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, softest_mode
@@ -349,20 +349,13 @@ class _Walk:
         return found
 
     def _predicted(self, aim: float) -> State:
-        """Extrapolate the last equilibria, unless that would turn an element inside out.
-
-        It ends where surfaces would pass into each other too far.
-        """
+        """Extrapolate the last equilibria, as far as may be."""
         here = self.here
-        if not self.past:
-            return here.state
-        aim = min(aim, here.fraction + LONGEST_REACH * (here.fraction - self.past[-1].fraction))
+        if self.past:
+            aim = min(aim, here.fraction + LONGEST_REACH * (here.fraction - self.past[-1].fraction))
         known = (*self.past, here)
-        predicted = extrapolated([e.fraction for e in known], [e.state for e in known], aim)
-        part = self.system.longest_step(here.state, predicted.u - here.state.u)
-        if part < 1.0:
-            predicted = predicted.beyond(here.state, part - 1.0)
-        return predicted if self.system.worst_jacobian(predicted.u)[0] > 0.0 else here.state
+        state, _ = predicted(self.system, [e.fraction for e in known], [e.state for e in known], aim)
+        return state
 
 
 def _overlap(system: System, state: State) -> float:

@@ -7,9 +7,35 @@ from collections.abc import Sequence
 import numpy as np
 
 from turgor.fem.state import State
+from turgor.fem.system import System
 
 LARGEST_WEIGHT = 4.0
 """A parabola through states of which one would count more than this is no better than a line; 3 for equal steps."""
+
+
+def predicted(system: System, places: Sequence[float], states: Sequence[State], aim: float) -> tuple[State, float]:
+    """Return where the path is expected at `aim`, and the part of the way there that this is.
+
+    Less than one where surfaces would meet, or pass into each other too far; zero, the last state itself, where an
+    element would turn inside out or there is nothing to go by.
+
+    Parameters
+    ----------
+    system
+        The actuator.
+    places, states
+        Where the last states are on the path, oldest first, and the states.
+    aim
+        Where to go.
+    """
+    here = states[-1]
+    if len(states) == 1:
+        return here, 0.0
+    there = extrapolated(places, states, aim)
+    part = system.longest_step(here, there.u - here.u)
+    if part < 1.0:
+        there = there.beyond(here, part - 1.0)
+    return (there, part) if system.worst_jacobian(there.u)[0] > 0.0 else (here, 0.0)
 
 
 def extrapolated(places: Sequence[float], states: Sequence[State], aim: float) -> State:

@@ -18,7 +18,7 @@ from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.linear import LinearSolver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
-from turgor.solver.prediction import extrapolated
+from turgor.solver.prediction import predicted
 
 log = logger("solver")
 
@@ -137,19 +137,13 @@ class VolumeWalk:
         NotConvergedError
             If there is none near.
         """
-        here, before = self.here, self.before
-        guess, fraction = here.state, here.fraction
-        if before is not None:
-            known = [e for e in (self._earlier, before, here) if e is not None]
-            places = [self.measure(e) for e in known]
+        known = [e for e in (self._earlier, self.before, self.here) if e is not None]
+        places = [self.measure(e) for e in known]
+        guess, part = predicted(self.system, places, [e.state for e in known], value)
+        fraction = self.here.fraction
+        if part > 0.0:
             reach = (value - places[-1]) / (places[-1] - places[-2])
-            predicted = extrapolated(places, [e.state for e in known], value)
-            part = self.system.longest_step(here.state, predicted.u - here.state.u)
-            if part < 1.0:  # surfaces would meet on the way
-                predicted, reach = predicted.beyond(here.state, part - 1.0), part * reach
-            if self.system.worst_jacobian(predicted.u)[0] > 0.0:
-                guess = predicted
-                fraction += reach * (here.fraction - before.fraction)
+            fraction += part * reach * (fraction - known[-2].fraction)
         control = self.quantity.fixed(value)
         found = find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
         # A prediction that needed no iteration has not been asked for its compliance yet.
