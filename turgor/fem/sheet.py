@@ -30,7 +30,8 @@ class Sheet(Solid):
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F in the plane over the quadrature points and the mesh cell where it is."""
-        super()._deform(u)
+        super()._find_deformation(u)
+        self._deformed_by = None  # the thickness has not followed
         at = int(np.argmin(self._J.min(axis=1)))
         return float(self._J[at].min()), int(self.index[at])
 
@@ -69,8 +70,8 @@ class Sheet(Solid):
     def _bulk(self, dilatation: Floats) -> Floats:
         return np.zeros((len(self.dV), 0, 0))
 
-    def _deform(self, u: Floats) -> None:
-        super()._deform(u)
+    def _find_deformation(self, u: Floats) -> None:
+        super()._find_deformation(u)
         area_ratio = self._J.copy()
         self._J[:] = 1.0
         for _ in range(MOST_STEPS):
@@ -94,7 +95,7 @@ class Sheet(Solid):
 
     def _respond_fully(self) -> None:
         """Add the volumetric part to Kirchhoff stress and tangent: J U' 1 and (J² U'' + J U') 1⊗1 − 2 J U' I."""
-        super()._respond()
+        super()._find_response()
         pressure = self._J * self.material.volumetric.pressure(self._J)
         growth = self._J**2 * self.material.volumetric.stiffness(self._J) + pressure
         for r in range(6):
@@ -104,7 +105,7 @@ class Sheet(Solid):
                     self._tangent[:, :, PACK[r, s]] += growth
             self._tangent[:, :, PACK[r, r]] -= (2.0 if r < 3 else 1.0) * pressure
 
-    def _respond(self) -> None:
+    def _find_response(self) -> None:
         """Kirchhoff stress and tangent in the plane, the stretch across it eliminated."""
         self._respond_fully()
         tangent = self._tangent.reshape(-1, TANGENT_SIZE)

@@ -73,6 +73,9 @@ class Solid:
         self._lagged_tau = np.empty((m, q, 6))
         self._force = np.empty((m, n, self.cell.dimension))
         self._places = kernels.packing(n, self.cell.dimension)
+        # Force, stiffness and what lags after a step are asked for at one displacement after another.
+        self._deformed_by: Floats | None = None
+        self._has_responded = False
 
     def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return what lags at displacement `u`, ``(m, k + 6 q)``.
@@ -211,6 +214,18 @@ class Solid:
         return np.asarray(weighted.swapaxes(1, 2) @ self.modes)
 
     def _deform(self, u: Floats) -> None:
+        """Bring deformation gradients and dilatations to a displacement, unless they are there."""
+        if self._deformed_by is None or not np.array_equal(u, self._deformed_by):
+            self._deformed_by, self._has_responded = u.copy(), False
+            self._find_deformation(u)
+
+    def _respond(self) -> None:
+        """Bring isochoric Kirchhoff stress and tangent to the deformation, unless they are there."""
+        if not self._has_responded:
+            self._find_response()
+            self._has_responded = True
+
+    def _find_deformation(self, u: Floats) -> None:
         kernels.deformation(u, self.nodes, self.G, self.dV, self.modes, self._F, self._J, self._dilatation)
 
     def _law(self) -> tuple[Floats, ...]:
@@ -225,8 +240,7 @@ class Solid:
         constitutive.isochoric_stretches(F, J, stretches, directions)
         return *self.material.derivatives(stretches), stretches, directions
 
-    def _respond(self) -> None:
-        # Isochoric Kirchhoff stress and tangent at every quadrature point.
+    def _find_response(self) -> None:
         F, J = self._F.reshape(-1, 3, 3), self._J.ravel()
         tau, tangent = self._tau.reshape(-1, 6), self._tangent.reshape(-1, TANGENT_SIZE)
         if isinstance(self.material, InvariantModel):
