@@ -11,6 +11,7 @@ from turgor.fem.constraints import Condition, conditions_at_nodes
 from turgor.fem.section import Axisymmetric, surface_areas
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.fem.term import resultants
 from turgor.mesh.cells import face_cell
 from turgor.mesh.mesh import in_space
 
@@ -57,10 +58,8 @@ class Reactions:
     def _resultants(self, state: State, name: str, nodal: Floats) -> dict[str, Any]:
         about, force = self._about[name], in_space(self._system.body_part(nodal))
         arm = in_space(self._system.mesh.points + self._system.body_part(state.u)) - about
-        total, torque = force.sum(axis=0), np.cross(arm, force).sum(axis=0)
-        if isinstance(self._system.section, Axisymmetric):
-            total[0], torque[:] = 0.0, 0.0
-        return {"force_N": total.tolist(), "torque_N_mm": torque.tolist(), "about_mm": about.tolist()}
+        total, torque = resultants(force, arm, turned=isinstance(self._system.section, Axisymmetric))
+        return {"force_N": list(total), "torque_N_mm": list(torque), "about_mm": about.tolist()}
 
 
 def _shares(system: System) -> list[tuple[str, Ints, Floats]]:

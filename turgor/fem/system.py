@@ -230,9 +230,9 @@ class System:
 
     def nodal(self, free: Floats) -> Floats:
         """Return the nodal field ``(n_points, d)`` with the given free components, zero elsewhere."""
-        field = np.zeros(self._rest.size)
-        field[self.pattern.free] = free
-        return self.constraints.from_frames(field.reshape(self._rest.shape))
+        field = self._rest
+        field.ravel()[self.pattern.free] = free
+        return self.constraints.from_frames(field)
 
     def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0, grips: tuple[Floats, ...] = ()) -> State:
         """Return the state of displacement `u` in which nothing lags."""

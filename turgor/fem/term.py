@@ -12,6 +12,7 @@ from turgor.fem.state import State
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Triple = tuple[float, float, float]
 
 
 class Term(Protocol):
@@ -109,3 +110,19 @@ def pack_symmetric(blocks: Floats, out: Floats) -> None:
     """Write the upper triangles of ``blocks (n_blocks, n, n)`` into ``out (n_blocks, packed)``."""
     row, col = np.triu_indices(blocks.shape[-1])
     out[:] = blocks[..., row, col]
+
+
+def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Triple]:
+    """Return force and torque of the pushes ``(n, 3)`` with arms ``(n, 3)``.
+
+    `turned`: the model is a body of revolution, around whose axis y all forces across it cancel.
+    """
+    force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
+    if turned:
+        force[0] = torque[2] = 0.0
+    return triple(force), triple(torque)
+
+
+def triple(vector: Floats) -> Triple:
+    """Return the three components of a vector."""
+    return float(vector[0]), float(vector[1]), float(vector[2])

@@ -16,12 +16,13 @@ from turgor.fem.contact.facets import Facets
 from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.hull import Hull
 from turgor.fem.contact.intersection import edges_and_triangles
-from turgor.fem.contact.skin import Skin
-from turgor.fem.contact.term import Touch, resultants, triple
+from turgor.fem.contact.recent import Recent
+from turgor.fem.contact.skin import SOON, Skin
+from turgor.fem.contact.term import Touch
 from turgor.fem.pattern import packed_size
 from turgor.fem.section import Axisymmetric, Section, depth
 from turgor.fem.state import State
-from turgor.fem.term import NO_NODES, Unlagged, pack_symmetric
+from turgor.fem.term import NO_NODES, Unlagged, pack_symmetric, resultants, triple
 from turgor.mesh.mesh import in_space
 
 Floats = NDArray[np.float64]
@@ -38,12 +39,6 @@ BELOW_REST = 0.9
 
 STIFFNESS = 1.0 / 8.0
 """Stiffness of the barrier over the air pressure: two walls under it are then half of the reach apart (measured)."""
-
-SOON = 0.5
-"""Faces whose gap is below so many face sizes are given room in the matrix."""
-
-KEPT = 3
-"""So many answers are kept: a step asks about its beginning, its end and what lies between in turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +99,7 @@ class Barrier(Unlagged):
         self._rest, self._weights = self._vertices()
         self._spread = sp.kron(self._weights, sp.identity(self._d), format="csr")
         self._mesh = self._collision_mesh(group, section)
-        self._found: list[tuple[Floats, _Near]] = []
+        self._near = Recent(self._look)
         wall = float(skin.wall.min())
         self._wall = wall
         self.reach = self._reach_at_rest(REACH * wall)
@@ -226,14 +221,9 @@ class Barrier(Unlagged):
         own = sp.csr_matrix((weights.data, weights.indices, weights.indptr), shape=(self._n, columns))
         return np.vstack([rest, self._hull.vertices]), sp.vstack([own, bodies], format="csr")
 
-    def _near(self, u: Floats) -> _Near:
-        for at, found in self._found:
-            if np.array_equal(at, u):
-                return found
+    def _look(self, u: Floats) -> _Near:
         places = self._places(u)
-        near = _Near(places, self._collisions(places, self.reach))
-        self._found = [(u.copy(), near), *self._found[: KEPT - 1]]
-        return near
+        return _Near(places, self._collisions(places, self.reach))
 
     def _collisions(self, places: Floats, reach: float) -> Any:
         found = self._ipctk.NormalCollisions()

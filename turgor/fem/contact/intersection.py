@@ -53,7 +53,9 @@ class IntersectionCheck:
         """
         x = in_space(self.facets.places(u))
         x += self._depth[:, None] * self._inward(x)
-        return pieces_intersect(self.facets, x[:, : self.skin.dimension])
+        x = np.asfortranarray(x[:, : self.skin.dimension])
+        ipctk = require("ipctk")
+        return bool(ipctk.has_intersections(ipctk.CollisionMesh(x, *edges_and_triangles(self.facets.pieces)), x))
 
     def _inward(self, x: Floats) -> Floats:
         """Return the ways ``(n, 3)`` that draw in the pieces around each corner of them by one: longer at edges."""
@@ -65,19 +67,6 @@ class IntersectionCheck:
             np.add.at(total, corner, outward)
             np.add.at(square, corner, products)
         return np.asarray(-np.linalg.solve(square, total[:, :, None])[:, :, 0])
-
-
-def pieces_intersect(facets: Facets, places: Floats) -> bool:
-    """Say whether any two pieces that share no vertex intersect, their vertices at `places` ``(n, d)``.
-
-    Raises
-    ------
-    MissingPackageError
-        If the IPC Toolkit is not installed.
-    """
-    ipctk = require("ipctk")
-    x = np.asfortranarray(places)
-    return bool(ipctk.has_intersections(ipctk.CollisionMesh(x, *edges_and_triangles(facets.pieces)), x))
 
 
 def edges_and_triangles(pieces: Ints) -> tuple[Ints, Ints]:

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.skin import STIFFNESS, Skin
-from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch, Triple, resultants, triple
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
 from turgor.fem.pattern import packed_size
 from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
-from turgor.fem.term import NO_NODES, Unlagged, add_at_nodes, pack_symmetric
+from turgor.fem.term import NO_NODES, Triple, Unlagged, add_at_nodes, pack_symmetric, resultants, triple
 from turgor.mesh.mesh import in_space
 
 Floats = NDArray[np.float64]
@@ -211,7 +211,7 @@ class Obstacle:
         face, quad, _ = points_of(rows, self.skin)
         np.add.at(push, (face, quad), self._rubbing(state).drag)
         arm = self._places(state.u, state.loads) - self.body.reference_point
-        push, arm = (np.pad(v.reshape(-1, v.shape[2]), ((0, 0), (0, 3 - v.shape[2]))) for v in (push, arm))
+        push, arm = (in_space(v.reshape(-1, v.shape[2])) for v in (push, arm))
         return resultants(push, arm, turned=self._turned)
 
     def _displacement(self, state: State) -> Triple | None:

@@ -34,6 +34,9 @@ the wall is thick, their size counts instead: contact then has details smaller t
 PART_OF_MODULUS = 0.25
 """Where no pressure tells how hard surfaces press, this part of the shear modulus is taken for it."""
 
+SOON = 0.5
+"""Faces whose gap is below so many face sizes are given room in the matrix."""
+
 
 class Skin:
     """Boundary faces (in a plane model edges) with what contact needs to know of them.

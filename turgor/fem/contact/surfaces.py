@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.intersection import IntersectionCheck
 from turgor.fem.contact.pairs import NOWHERE, balls, find_partners, gap_gradients, pair_stiffness
+from turgor.fem.contact.recent import Recent
 from turgor.fem.contact.search import Search
-from turgor.fem.contact.skin import STIFFNESS, Skin
+from turgor.fem.contact.skin import SOON, STIFFNESS, Skin
 from turgor.fem.contact.term import GROWTH_OF_OVERLAP, TRIALS, Touch
 from turgor.fem.pattern import packed_size
 from turgor.fem.state import State
@@ -24,12 +25,6 @@ Indices = NDArray[np.intp]
 
 REACH = 3.0
 """Before a step, pairs are watched whose gap is up to so many face sizes."""
-
-KEPT = 3
-"""So many answers are kept: a step asks about its beginning, its end and what lies between in turn."""
-
-SOON = 0.5
-"""Faces whose gap is below so many face sizes are given room in the matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +76,7 @@ class SurfaceContact:
         self.friction = friction
         self._number = number
         self._search = Search(skin, group)
-        self._found: list[tuple[Floats, Pairs]] = []
+        self._touching = Recent(self._overlapping)
 
     @cached_property
     def intersection_check(self) -> IntersectionCheck:
@@ -213,14 +208,9 @@ class SurfaceContact:
         stiffness = self._stiffness_between(state, face, quad, other)
         return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
 
-    def _touching(self, u: Floats) -> Pairs:
-        for at, found in self._found:
-            if np.array_equal(at, u):
-                return found
+    def _overlapping(self, u: Floats) -> Pairs:
         pairs = self._pairs(self.skin.space(u), 0.0)
-        pairs = pairs.where(pairs.gap < 0.0)
-        self._found = [(u.copy(), pairs), *self._found[: KEPT - 1]]
-        return pairs
+        return pairs.where(pairs.gap < 0.0)
 
     def _pairs(self, x: Floats, reach: float) -> Pairs:
         skin = self.skin

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem.state import State
-from turgor.fem.term import Term
+from turgor.fem.term import Term, Triple
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Triple = tuple[float, float, float]
 
 LARGEST_OVERLAP = 0.01
 """An equilibrium counts only where no overlap is more than this part of the wall behind it."""
@@ -54,8 +53,8 @@ class Touch:
     area: float
     overlap: float
     overlap_per_wall: float
-    force: tuple[float, float, float] | None = None
-    torque: tuple[float, float, float] | None = None
+    force: Triple | None = None
+    torque: Triple | None = None
     displacement: Triple | None = None
     gap: float | None = None
     gap_per_wall: float | None = None
@@ -94,19 +93,3 @@ class Contact(Term, Protocol):
         With `dragged`, what slides has dragged along what it holds on to: a new step begins.
         """
         ...
-
-
-def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Triple]:
-    """Return force and torque of the pushes ``(n, 3)`` with arms ``(n, 3)``.
-
-    `turned`: the model is a body of revolution, around whose axis y all forces across it cancel.
-    """
-    force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
-    if turned:
-        force[0] = torque[2] = 0.0
-    return triple(force), triple(torque)
-
-
-def triple(vector: Floats) -> Triple:
-    """Return the three components of a vector."""
-    return float(vector[0]), float(vector[1]), float(vector[2])
