@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from turgor.common.errors import InputError
 from turgor.common.log import logger
-from turgor.common.optional import require
 from turgor.geometry.actuator import Shape
+from turgor.geometry.imported.triangles import agreeing
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import FloatArray, IntArray
@@ -119,11 +119,7 @@ def outward(points: FloatArray, triangles: IntArray) -> IntArray:
 
     The sense in which gmsh lists the faces of a hollow volume does not tell the outside from a cavity.
     """
-    surface = require("pyvista").PolyData.from_regular_faces(points, triangles)
-    agreeing = surface.compute_normals(
-        cell_normals=True, point_normals=False, consistent_normals=True, split_vertices=False, auto_orient_normals=False
-    )
-    turned = np.asarray(agreeing.regular_faces, dtype=np.int32)
+    turned = agreeing(points, triangles).astype(np.int32)
     sides = turned[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix((np.ones(len(sides)), sides.T), shape=(len(points), len(points)))
     shell = connected_components(graph, directed=False)[1][turned[:, 0]]

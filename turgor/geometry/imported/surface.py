@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from turgor.common.optional import require
 from turgor.geometry.actuator import LARGEST, SMALLEST
 from turgor.geometry.imported.crossings import crossings
 from turgor.geometry.imported.stl_text import read_facets
-from turgor.geometry.imported.triangles import TriangleBody
+from turgor.geometry.imported.triangles import TriangleBody, agreeing
 
 LOG = logger("geometry")
 
@@ -243,18 +243,15 @@ def _filled(points: Floats, triangles: Ints, solid: Ints, path: str | Path) -> t
 
 def _fill_with_vtk(points: Floats, triangles: Ints, size: float) -> Ints:
     """Return the triangles followed by those that close all holes."""
-    whole = _to_pyvista(points, triangles).fill_holes(2.0 * size)
+    surface = require("pyvista", "repairing a surface").PolyData.from_regular_faces(points, triangles)
+    whole = surface.fill_holes(2.0 * size)
     filled: Ints = np.asarray(whole.regular_faces, dtype=np.int64)
     return np.vstack([triangles, filled[len(triangles) :]])
 
 
 def _turned(points: Floats, triangles: Ints, path: str | Path) -> Ints:
     """Turn the facets of each shell to agree with each other."""
-    mesh = _to_pyvista(points, triangles)
-    turned = mesh.compute_normals(
-        cell_normals=True, point_normals=False, consistent_normals=True, split_vertices=False, auto_orient_normals=False
-    )
-    found: Ints = np.asarray(turned.regular_faces, dtype=np.int64)
+    found = agreeing(points, triangles)
     start = np.stack([found, np.roll(found, -1, axis=1)], axis=2).reshape(-1, 2)
     if len(np.unique(start, axis=0)) < len(start):
         raise InputError(
@@ -315,11 +312,6 @@ def _parts(pairs: Ints, count: int, of_nodes: bool = False) -> tuple[int, Ints]:
     part = part if of_nodes else part[pairs[:, 0]]
     values, index = np.unique(part, return_inverse=True)
     return len(values), index.ravel().astype(np.int64)
-
-
-def _to_pyvista(points: Floats, triangles: Ints) -> Any:
-    pyvista = require("pyvista", "repairing a surface")
-    return pyvista.PolyData.from_regular_faces(points, triangles)
 
 
 def _place(point: Floats) -> list[float]:

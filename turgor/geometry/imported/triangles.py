@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.common.optional import require
 
 Floats = NDArray[np.float64]
 
@@ -97,6 +98,21 @@ class TriangleBody:
         span = self._corners[triangle, (first + 1) % 3] - self._corners[triangle, first]
         unit = span / np.linalg.norm(span, axis=1)[:, None]
         return np.where(((feature >= EDGE) & (feature < CORNER))[:, None], unit, 0.0)
+
+
+def agreeing(points: Floats, triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the triangles ``(k, 3)``, in their order, turned so that neighbours look to the same side.
+
+    Raises
+    ------
+    MissingPackageError
+        If pyvista is absent.
+    """
+    surface = require("pyvista", "repairing a surface").PolyData.from_regular_faces(points, triangles)
+    turned = surface.compute_normals(
+        cell_normals=True, point_normals=False, consistent_normals=True, split_vertices=False, auto_orient_normals=False
+    )
+    return np.asarray(turned.regular_faces, dtype=np.int64)
 
 
 def _opposite(ends: NDArray[np.intp], n: int) -> NDArray[np.intp]:
