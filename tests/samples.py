@@ -57,3 +57,10 @@ def check_derivatives(term, state):
     expected = differences(force, state, direction)
     assert np.linalg.norm(product - expected) <= 1e-8 * np.linalg.norm(force(state)) + 1e-8 * np.linalg.norm(expected)
     return np.linalg.norm(expected)
+
+
+def check_assembled(system, state, direction, step):
+    """Compare the stiffness assembled last, along a direction, with the difference of all forces."""
+    more, less = (system.forces(shifted(state, direction, h))[0] for h in (step, -step))
+    expected = (more - less) / (2.0 * step)
+    np.testing.assert_allclose(system.stiffness_times(direction), expected, atol=1e-6 * np.abs(expected).max())
