@@ -1,0 +1,69 @@
+"""Newton's iterations on the way to the loads of several actuators, each of them one factorisation.
+
+    .venv/bin/python benchmarks/iterations.py
+
+Prints the rows of the table in docs/theory/formulation.md: the iterations of each state, those that failed on the way
+left out. With PYTHONPATH at the checkout of another commit it counts that one's.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import turgor as tg
+from turgor.fem.loads import Force
+from turgor.fem.section import PlaneStrain
+from turgor.fem.supports import Clamped
+from turgor.fem.system import System
+from turgor.materials.models.neo_hookean import NeoHookean
+from turgor.materials.volumetric import Quadratic
+from turgor.mesh.structured import rectangle
+from turgor.solver.path import solve_path
+from turgor.study.build import system_of
+from turgor.study.materials import build_materials
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SHORT = ['geometry.length="70 mm"', 'geometry.cap="8 mm"', 'geometry.fibre_length="60 mm"']
+CASES: dict[str, tuple[str, list[str], list[float]]] = {
+    "honeycomb, 1 mm elements": ("honeycomb", ['mesh.size="1 mm"'], [0.25, 0.5, 0.75, 1.0]),
+    "reinforced tube, 6 mm": ("reinforced-tube", ['mesh.size="6 mm"'], [0.22, 0.44, 0.66, 0.88, 1.0]),
+    "fibre tube of 70 mm, 51°": ("fibre-tube", SHORT, [0.25, 0.5, 0.75, 1.0]),
+    "PneuNet, eight chambers, 4 mm": ("pneunet", ['mesh.size="4 mm"', "contact=null"], [0.2, 0.4, 0.6, 0.8, 1.0]),
+    "bellows": ("bellows", [], [0.25, 0.5, 0.75, 1.0]),
+    "capped tube (case T)": ("tube", [], [1.0]),
+}
+
+
+def counts(system: System, fractions: list[float]) -> str:
+    """Return the iterations of every state behind rest."""
+    return ", ".join(str(found.iterations) for found in solve_path(system, fractions) if found.fraction > 0.0)
+
+
+def strip(strength: float) -> System:
+    """Return a cantilever of 100 × 1 mm in plane strain under a force of `strength` EI/L² across its end."""
+    length, thickness, depth, modulus = 100.0, 1.0, 2.0, 0.1
+    rubber = NeoHookean(C10=modulus / 2, volumetric=Quadratic(1e4 * modulus))
+    bending = rubber.young_modulus / (1.0 - rubber.poisson_ratio**2) * depth * thickness**3 / 12.0
+    mesh = rectangle((length, thickness), (40, 1), "quad9")
+    load = Force("x1", (0.0, strength * bending / length**2, 0.0))
+    return System(mesh, {"body": rubber}, [Clamped("x0")], [load], section=PlaneStrain(depth))
+
+
+def actuator(name: str, changes: list[str]) -> System:
+    """Return the system of an example with some of its keys changed."""
+    case = tg.load_case(EXAMPLES / f"{name}.yaml", changes)
+    materials, _ = build_materials(case.materials)
+    return system_of(case, tg.mesh_case(case), materials)
+
+
+def main() -> None:
+    """Print one row a case."""
+    print("| case | iterations |\n|---|---|")
+    ends = [counts(strip(strength), [1.0]) for strength in (1.0, 5.0, 10.0)]
+    print(f"| elastica, end force 1, 5, 10 EI/L², in one step | {', '.join(ends)} |")
+    for title, (name, changes, fractions) in CASES.items():
+        print(f"| {title} | {counts(actuator(name, changes), fractions)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
