@@ -13,10 +13,14 @@ from turgor.fem.system import System
 from turgor.materials.library import get
 from turgor.materials.stability import verdict
 from turgor.mesh.structured import box, quarter_ring, rectangle
+from turgor.solver.control import Volume
 from turgor.solver.events import Event, Outcome
+from turgor.solver.follow import follow, follow_arc
+from turgor.solver.linear import SingularMatrixError, SuperLU
 from turgor.solver.newton import Equilibrium, NotConvergedError
 from turgor.solver.path import solve_path
-from turgor.solver.stops import stopped, worst_point
+from turgor.solver.stops import StoppedShortError, stopped, worst_point
+from turgor.solver.volume import VolumeWalk
 
 
 def sphere(material):
@@ -106,3 +110,73 @@ def test_a_compressed_column_bifurcates_and_shows_how():
     expected = 0.5 * (1 - np.cos(2 * np.pi * mesh.points[:, 1] / length))
     np.testing.assert_allclose(sideways, expected, atol=0.05)
     assert event.stable is False
+
+
+FULL = 0.06
+"""Beyond the limit of the thick sphere, MPa."""
+
+
+def balloon():
+    material = neo_hookean()
+    return System(
+        quarter_ring(1.0, 1.5, 2),
+        {"body": material},
+        [Sliding("y0")],
+        [Pressure("inner", FULL)],
+        section=Axisymmetric(),
+    )
+
+
+def by_load(system, keep):
+    solve_path(system, [0.5, 1.0], on_equilibrium=keep)
+
+
+def by_volume(system, keep):
+    rest = system.conjugate(system.reference_state())
+    follow(system, Volume(), [2.0 * rest, 20.0 * rest], on_equilibrium=keep)
+
+
+def by_arc(system, keep, times=20.0):
+    rest = system.conjugate(system.reference_state())
+    follow_arc(system, Volume(), times * rest, 0.1, on_equilibrium=keep)
+
+
+def by_arc_to_a_volume(system, keep):
+    by_arc(system, keep, times=2.0)
+
+
+@pytest.mark.parametrize("walk", [by_load, by_volume, by_arc, by_arc_to_a_volume])
+def test_what_cannot_be_located_ends_a_path_at_its_last_state(walk, monkeypatch):
+    at = VolumeWalk.at
+
+    def nowhere_between(self, value):
+        known = [self.measure(e) for e in (self.before, self.here) if e is not None]
+        if len(known) == 2 and min(known) < value < max(known):
+            raise NotConvergedError("the iteration wanders")
+        return at(self, value)
+
+    monkeypatch.setattr(VolumeWalk, "at", nowhere_between)
+    system, kept = balloon(), []
+    with pytest.raises(StoppedShortError, match=r"beyond \d.* kPa in inner .*the iteration wanders") as stop:
+        walk(system, kept.append)
+    assert stop.value.exit_code == 3
+    assert stop.value.advice
+    assert kept[-1].fraction == stop.value.facts["last_fraction"] > 0.0
+    assert len({round(e.fraction, 6) for e in kept}) == len(kept)
+    # pressure of the incompressible sphere (Green and Zerna) at the state that was kept
+    stretch = np.cbrt(system.conjugate(kept[-1].state) / system.conjugate(system.reference_state()))
+    outer = (1 + (stretch**3 - 1) / 1.5**3) ** (1 / 3)
+    exact = 0.1 * ((2 / outer + 0.5 / outer**4) - (2 / stretch + 0.5 / stretch**4))
+    assert kept[-1].fraction * FULL == pytest.approx(exact, rel=5e-3)
+
+
+@pytest.mark.parametrize("walk", [by_load, by_volume, by_arc])
+def test_a_singular_stiffness_ends_a_path_as_any_failure_does(walk, monkeypatch):
+    def singular(self, values):
+        raise SingularMatrixError("the stiffness matrix is singular")
+
+    monkeypatch.setattr("turgor.solver.linear.solver_in_use", lambda: SuperLU)
+    monkeypatch.setattr(SuperLU, "factorise", singular)
+    with pytest.raises(StoppedShortError, match=r"beyond 0 kPa in inner \(the stiffness is singular\)") as stop:
+        walk(balloon(), pytest.fail)
+    assert stop.value.advice

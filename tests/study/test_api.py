@@ -9,7 +9,9 @@ import pytest
 
 import turgor as tg
 from turgor.common.errors import InputError, SolverError
+from turgor.materials.library import get
 from turgor.results.store import RunStore
+from turgor.solver.path import LimitPressureError
 from turgor.study.case import load_case
 from turgor.study.run import run
 
@@ -142,3 +144,17 @@ def test_a_path_beyond_the_limit_raises_with_facts(mesh: tg.Mesh) -> None:
     with pytest.raises(SolverError, match="kPa in cavity") as stop:
         tg.Model(mesh, body=rubber).inflate("500 kPa", steps=20, on_step=kept.append)
     assert stop.value.facts["pressure:cavity_kPa"] == pytest.approx(kept[-1].pressure.magnitude[-1])
+
+
+def test_the_limit_of_a_soft_chamber_is_located() -> None:
+    # It has grown nineteenfold there: what lies between two states of the walk is far from a straight line.
+    finger = tg.PneuNet(chambers=1, symmetric=True)
+    model = tg.Model(finger.mesh(size="5 mm"), body=get("ecoflex-00-35-fast-yeoh"))
+    kept: list[tg.Path] = []
+    with pytest.raises(LimitPressureError, match="limit is reached") as stop:
+        model.inflate("100 kPa", steps=1, on_step=kept.append)
+    (state,) = kept[-1].history
+    assert stop.value.facts["pressure:cavity_kPa"] == pytest.approx(state["pressure_kPa"])
+    # inflate_to("2100 %", steps=20) finds 18.906 kPa at 3705 and at 3900 mm³
+    assert 3705 < state["cavity_volume_mm3"] < 3900
+    assert state["pressure_kPa"] == pytest.approx(18.907, rel=1e-3)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from turgor.common.errors import InputError
+from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.system import System
 from turgor.solver.control import ArcLength, Quantity, Volume
 from turgor.solver.linear import make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
-from turgor.solver.stops import StoppedShortError, stopped
+from turgor.solver.stops import stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import LimitPoint, VolumeWalk
 
@@ -79,21 +80,21 @@ def follow(
     post = _Post(walk.here, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
-    for target in targets:
-        while sign * (target - walk.measure(walk.here)) > _rounding(target):
-            previous = walk.here
-            found = walk.advance(target)
-            if found is None:
-                raise _ended(walk, post)
-            post.tally.count(found)
-            if on_progress is not None:
-                part = (walk.measure(found) - begin) / (targets[-1] - begin)
-                on_progress(part, found.iterations, found.residuals[-1])
-            if previous.rising != found.rising:
-                post.send_limit(walk.limit_between(previous, found))
-                walk.stand_at(found, previous)
-        if walk.here is not post.last:
-            post.send(walk.here)
+    with _telling_why(walk, post):
+        for target in targets:
+            while sign * (target - walk.measure(walk.here)) > _rounding(target):
+                previous = walk.here
+                found = walk.advance(target)
+                if found is None:
+                    raise _nowhere(walk)
+                post.tally.count(found)
+                if on_progress is not None:
+                    part = (walk.measure(found) - begin) / (targets[-1] - begin)
+                    on_progress(part, found.iterations, found.residuals[-1])
+                if previous.rising != found.rising:
+                    post.send_limit(walk.limit_between(previous, found))
+                    walk.stand_at(found, previous)
+            post.send_once(walk.here)
     return post.sent
 
 
@@ -141,23 +142,37 @@ def follow_arc(
     if start is None and system.loaded_at_start:
         post.send(walk.here)
     arc = _Arc(walk, sign, scale, length)
-    while sign * (target - walk.measure(walk.here)) > _rounding(target):
-        previous = walk.here
-        found = arc.advance()
-        if found is None:
-            raise _ended(walk, post)
-        if sign * (walk.measure(found) - target) > 0.0:
-            # The end is cut by volume; between the two the path is as good as straight.
-            walk.stand_at(found, walk.here)
-            found = walk.at(target)
-        post.tally.count(found)
-        if on_progress is not None:
-            on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
-        if previous.rising != found.rising and arc.is_flat(previous, found):
-            post.send_limit(walk.limit_between(previous, found))
-        walk.stand_at(found, previous)
-        post.send(found)
+    with _telling_why(walk, post):
+        while sign * (target - walk.measure(walk.here)) > _rounding(target):
+            previous = walk.here
+            found = arc.advance()
+            if found is None:
+                raise _nowhere(walk)
+            if sign * (walk.measure(found) - target) > 0.0:
+                found = _cut(walk, found, target)
+            post.tally.count(found)
+            if on_progress is not None:
+                on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
+            before = walk.before
+            walk.stand_at(found, previous, before)
+            if previous.rising != found.rising and arc.is_flat(previous, found):
+                post.send_limit(walk.limit_between(previous, found))
+                walk.stand_at(found, previous)
+            post.send(found)
     return post.sent
+
+
+def _cut(walk: VolumeWalk, beyond: Equilibrium, target: float) -> Equilibrium:
+    """Return the state at a volume between the one where the walk stands and one beyond.
+
+    Between the two the path is as good as straight. The walk goes on standing where it stands.
+    """
+    here, before = walk.here, walk.before
+    walk.stand_at(beyond, here, before)
+    try:
+        return walk.at(target)
+    finally:
+        walk.stand_at(here, before)
 
 
 class _Arc:
@@ -233,6 +248,11 @@ class _Post:
         if self._on_equilibrium is not None:
             self._on_equilibrium(self.sent[-1])
 
+    def send_once(self, equilibrium: Equilibrium) -> None:
+        """Hand out an equilibrium unless it was the last one to be."""
+        if equilibrium is not self.last:
+            self.send(equilibrium)
+
     def send_limit(self, limit: LimitPoint) -> None:
         """Hand out a limit of the load."""
         log.info("limit of the load at %.5g", limit.equilibrium.fraction)
@@ -245,15 +265,13 @@ def _walk_from(system: System, quantity: Quantity, options: NewtonOptions, start
     if system.kinks:
         raise InputError("loads with a programme follow time, not a volume", key="control")
     linear = make_linear_solver(system.pattern.row_start, system.pattern.column)
-    if start is None:
-        rest = system.reference_state()
-        start = Equilibrium(rest, 0.0, (0.0,), 0, 0)
-        if system.loaded_at_start:
-            try:
-                start = find_equilibrium(system, linear, rest, 0.0, options)
-            except NotConvergedError as error:
-                raise stopped(system, start, error) from error
-    return VolumeWalk(system, linear, start, 1.0, options, quantity)
+    here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
+    try:
+        if start is None and system.loaded_at_start:
+            here = find_equilibrium(system, linear, here.state, 0.0, options)
+        return VolumeWalk(system, linear, here, 1.0, options, quantity)
+    except NotConvergedError as error:
+        raise stopped(system, here, error) from error
 
 
 def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
@@ -275,7 +293,17 @@ def _rounding(target: float) -> float:
     return 1e-6 * abs(target)
 
 
-def _ended(walk: VolumeWalk, post: _Post) -> StoppedShortError:
-    if walk.here is not post.last:
-        post.send(walk.here)
-    return stopped(walk.system, walk.here, walk.failure or NotConvergedError("the path turns back"))
+def _nowhere(walk: VolumeWalk) -> NotConvergedError:
+    return walk.failure or NotConvergedError("the path turns back")
+
+
+@contextlib.contextmanager
+def _telling_why(walk: VolumeWalk, post: _Post) -> Iterator[None]:
+    """Where the solver stops, hand out the last equilibrium that the walk found and say why there is none beyond."""
+    try:
+        yield
+    except SolverError as error:
+        post.send_once(walk.here)
+        if isinstance(error, NotConvergedError):
+            raise stopped(walk.system, walk.here, error) from error
+        raise

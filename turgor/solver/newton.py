@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -196,10 +196,7 @@ def find_equilibrium(
             raise _failure(f"no equilibrium within {options.max_iterations} iterations", system, state, residuals)
         if _wanders(residuals, options.tolerance):
             raise _failure("the iteration wanders", system, state, residuals)
-        try:
-            factorise_tangent(system, linear, state)
-        except SingularMatrixError as error:
-            raise _failure("the stiffness is singular", system, state, residuals) from error
+        factorise_tangent(system, linear, state, residuals)
         lost += (linear.negative_pivots or 0) > LOST
         if lost >= LOSSES:
             raise _failure("the iteration lost its way among unstable states", system, state, residuals)
@@ -250,18 +247,21 @@ def _relative_gap(control: Control, conjugate: float, fraction: float) -> float:
     return abs(control.gap(conjugate, fraction)[0]) / control.scale(conjugate)
 
 
-def factorise_tangent(system: System, linear: LinearSolver, state: State) -> None:
+def factorise_tangent(system: System, linear: LinearSolver, state: State, residuals: Sequence[float] = ()) -> None:
     """Factorise the stiffness of a state, whose pattern is a new one where surfaces have come close to each other.
 
     Raises
     ------
-    SingularMatrixError
-        If it cannot be done.
+    NotConvergedError
+        If it is singular; with the `residuals` of the iteration that led there, if any.
     """
     values = system.stiffness(state)
     if linear.column is not system.pattern.column:
         linear.take(system.pattern.row_start, system.pattern.column)
-    linear.factorise(values)
+    try:
+        linear.factorise(values)
+    except SingularMatrixError as error:
+        raise _failure("the stiffness is singular", system, state, residuals) from error
 
 
 def _advanced(system: System, state: State, du: Floats, residuals: list[float], *, search: bool) -> tuple[State, float]:
@@ -320,7 +320,7 @@ def _accepted(
     state = system.consistent(state.u, state.loads, state.penalty, state.grips)
     factorisations = len(residuals) - 1
     if factorisations == 0 or residuals[-2] > NEAR:
-        factorise_tangent(system, linear, state)
+        factorise_tangent(system, linear, state, residuals)
         factorisations += 1
     return Equilibrium(state, fraction, tuple(residuals), factorisations, linear.negative_pivots, compliance)
 
@@ -330,7 +330,7 @@ def _rounding(system: System, state: State) -> float:
     return float(np.linalg.norm([solid.rounding(state.u) for solid in system.solids]))
 
 
-def _failure(reason: str, system: System, state: State, residuals: list[float]) -> NotConvergedError:
+def _failure(reason: str, system: System, state: State, residuals: Sequence[float]) -> NotConvergedError:
     facts: dict[str, object] = {"residuals": [float(f"{r:.3g}") for r in residuals]}
     if np.all(np.isfinite(state.u)):
         worst, cell = system.worst_jacobian(state.u)

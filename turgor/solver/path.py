@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from turgor.common.errors import InputError
+from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.state import State
@@ -139,7 +139,10 @@ def solve_path(
             for stop in (*(kink for kink in system.kinks if kink < fraction), fraction):
                 walk.to(stop)
             walk.deliver()
-    except StoppedShortError:
+    except NotConvergedError as error:
+        walk.deliver()
+        raise stopped(system, walk.here, error) from error
+    except SolverError:
         walk.deliver()
         raise
     return reached
@@ -176,10 +179,7 @@ class _Walk:
 
     def settle(self) -> None:
         """Find the equilibrium at load fraction zero under what acts from the start."""
-        try:
-            self._arrive(self._attempt(0.0, self.here.state))
-        except NotConvergedError as error:
-            raise stopped(self.system, self.here, error) from error
+        self._arrive(self._attempt(0.0, self.here.state))
 
     def to(self, target: float) -> None:
         """Walk to the load fraction `target`."""
@@ -263,7 +263,7 @@ class _Walk:
             if found is not None:
                 return found
         if self.step < self.options.smallest_step:
-            raise stopped(self.system, self.here, error) from error
+            raise error
         return None
 
     def _by_volume(self, target: float) -> Equilibrium | None:
@@ -275,6 +275,8 @@ class _Walk:
         ------
         LimitPressureError
             If the load has a maximum before `target`.
+        NotConvergedError
+            If it has one that cannot be located.
         """
         log.info("going on by volume control from %.4g", self.here.fraction)
         system, quantity = self.system, Volume(self.system.growth(self.here.fraction))

@@ -120,9 +120,9 @@ class VolumeWalk:
             return found
         return None
 
-    def stand_at(self, here: Equilibrium, before: Equilibrium | None) -> None:
-        """Go on from an equilibrium, predicting from it and another one."""
-        self._earlier, self.before, self.here = None, before, here
+    def stand_at(self, here: Equilibrium, before: Equilibrium | None, earlier: Equilibrium | None = None) -> None:
+        """Go on from an equilibrium, predicting from it and one or two others."""
+        self._earlier, self.before, self.here = earlier, before, here
 
     def measure(self, equilibrium: Equilibrium) -> float:
         """Return the quantity at an equilibrium."""
@@ -150,22 +150,35 @@ class VolumeWalk:
         return found if found.compliance is not None else self.with_compliance(found)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
-        """Return the limit point between two equilibria of the walk whose compliances differ in sign.
+        """Return the limit point between the last two equilibria of the walk, whose compliances differ in sign.
 
         The load fraction is stationary where its slope by the conjugate, the inverse of the compliance, vanishes; the
-        secant of the slopes finds the place, safeguarded by halving.
+        secant of the slopes finds the place, safeguarded by halving. Each state is predicted from the two that enclose
+        it and the one next to them.
+
+        Raises
+        ------
+        NotConvergedError
+            If the limit cannot be located; the walk then stands at `second` again.
         """
         ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
         span = ends[1][0] - ends[0][0]
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1]))[2]
+        third = self._earlier
         for _ in range(30):
             (q0, s0, e0), (q1, s1, e1) = ends
-            self.stand_at(e1, e0)
-            aim = q0 - s0 * (q1 - q0) / (s1 - s0)
-            aim = min(max(aim, q0 + 0.05 * (q1 - q0)), q1 - 0.05 * (q1 - q0))
-            best = self.at(aim)
+            self.stand_at(e1, e0, third)
+            aim = q0 + min(max(s0 / (s0 - s1), 0.05), 0.95) * (q1 - q0)
+            try:
+                best = self.at(aim)
+            except NotConvergedError as error:
+                self.stand_at(second, first)
+                reason = f"the load has a limit near {best.fraction:.4g} of the target, not located: {error.reason}"
+                raise NotConvergedError(reason, facts=error.facts) from error
             slope = 1.0 / _compliance(best)
-            ends[0 if slope * s0 > 0 else 1] = (aim, slope, best)
+            dropped = 0 if slope * s0 > 0 else 1
+            third = ends[dropped][2]
+            ends[dropped] = (aim, slope, best)
             if abs(slope) * span <= tolerance * abs(best.fraction):
                 break
         return LimitPoint(best, ends[0][1] > 0, softest_mode(self.system, self.linear, best))
