@@ -25,25 +25,30 @@ LENGTH, WIDTH, HEIGHT = 100.0, 12.0, 12.0
 CASE = "name: hollow-finger\nloads:\n  - pressure: 40 kPa\n"
 
 
-def hollow_finger(divisions: tuple[int, int, int] = (20, 4, 4), markers: bool = True) -> Mesh:
-    """A box along x, its axis on the x axis, with a box-shaped cavity one element away from its faces."""
+def hollow_finger(divisions: tuple[int, int, int] = (20, 4, 4), markers: bool = True, *, half: bool = False) -> Mesh:
+    """A box along x, its axis on the x axis, with a box-shaped cavity one element away from its faces.
+
+    Of an even number of elements across y there is a `half`, y ≥ 0.
+    """
     block = box((LENGTH, WIDTH, HEIGHT), divisions)
     points = block.points - [0.0, WIDTH / 2, HEIGHT / 2]
     cell = np.array([LENGTH, WIDTH, HEIGHT]) / divisions
     centres = points[block.cells[:, :4]].mean(axis=1)
-    half = np.array([LENGTH, WIDTH, HEIGHT]) / 2 - cell
-    inside = (np.abs(centres - [LENGTH / 2, 0.0, 0.0]) < half).all(axis=1)
-    nodes, cells = np.unique(block.cells[~inside], return_inverse=True)
+    hollow = np.array([LENGTH, WIDTH, HEIGHT]) / 2 - cell
+    kept = (np.abs(centres - [LENGTH / 2, 0.0, 0.0]) > hollow).any(axis=1) & ((centres[:, 1] > 0.0) | (not half))
+    nodes, cells = np.unique(block.cells[kept], return_inverse=True)
     points, cells = points[nodes], cells.reshape(-1, 10)
     faces = boundary_faces(cells)
     centre = points[faces[:, :3]].mean(axis=1)
     x = centre[:, 0]
+    cut = half & (np.abs(centre[:, 1]) < 1e-6)
     on_hull = (np.abs(centre - [LENGTH / 2, 0, 0]) > np.array([LENGTH, WIDTH, HEIGHT]) / 2 - 1e-6).any(axis=1)
     surfaces = {
         "mount": faces[x < 1e-6],
         "tip-face": faces[x > LENGTH - 1e-6],
         "outer": faces[on_hull & (x > 1e-6) & (x < LENGTH - 1e-6)],
-        "cavity": faces[~on_hull],
+        "cavity": faces[~on_hull & ~cut],
+        **({"symmetry": faces[cut]} if half else {}),
     }
     line = np.flatnonzero((np.abs(points[:, 1]) < 1e-9) & (np.abs(points[:, 2] + HEIGHT / 2) < 1e-9))
     line = line[np.argsort(points[line, 0])]

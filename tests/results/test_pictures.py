@@ -15,6 +15,7 @@ from turgor.common.errors import MissingPackageError
 from turgor.mesh.mesh import Mesh
 from turgor.results import pictures
 from turgor.results.camera import camera_for
+from turgor.results.drawing import drawing_of
 from turgor.results.pictures import SIZE, draw
 from turgor.results.skin import compact, flat_triangles, outside_faces, smooth_patches
 from turgor.results.stored import Body
@@ -35,7 +36,8 @@ def drawn(finger: Mesh) -> pictures.Pictures:
 
 
 def test_pictures_show_a_coloured_body_that_moves(drawn: pictures.Pictures) -> None:
-    first, last, section = (pixels(png) for png in (*drawn.states, drawn.section))
+    assert drawn.last is not None
+    first, last, section = (pixels(png) for png in (*drawn.states, drawn.last))
     for picture in (first, last, section):
         assert picture.shape == (SIZE[1], SIZE[0], 3)
         body = picture[: int(0.8 * SIZE[1])]  # without the colour bar
@@ -45,6 +47,7 @@ def test_pictures_show_a_coloured_body_that_moves(drawn: pictures.Pictures) -> N
     coloured = [np.ptp(picture[: int(0.8 * SIZE[1])], axis=2) > 40.0 for picture in (first, last)]
     assert (coloured[0] & coloured[1]).sum() < 0.5 * coloured[1].sum()  # bent by 200 degrees it is elsewhere
     assert (last != section).any()
+    assert drawn.last_label == "40 kPa, cut open"
 
 
 def test_the_body_is_drawn_in_the_colour_of_its_stress(drawn: pictures.Pictures) -> None:
@@ -97,13 +100,45 @@ def test_the_camera_sees_every_point_from_the_side_of_the_motion(turn: int) -> N
     assert np.argmax(np.abs(camera.towards)) == camera.side
 
 
-@pytest.mark.parametrize(("start", "sense"), [(0.0, -1.0), (-2.0, 1.0)], ids=["a half", "a whole"])
-def test_the_camera_looks_into_a_half_from_its_cut(start: float, sense: float) -> None:
+@pytest.mark.parametrize(
+    "cuts",
+    [
+        [(0, -1, 0)],
+        [(0, 1, 0)],
+        [(-1, 0, 0)],
+        [(0, 0, 1)],
+        [(-1, 0, 0), (0, -1, 0)],
+        [(1, 0, 0), (0, -1, 0), (0, 0, -1)],
+    ],
+    ids=str,
+)
+def test_the_camera_sees_every_cut(cuts: list[tuple[int, int, int]]) -> None:
     points = np.random.default_rng(0).uniform(0.0, 1.0, (50, 3)) * [4.0, 30.0, 50.0]
-    points[0, 0] = 0.0
-    camera = camera_for(points + np.array([start, 0.0, 0.0]), aspect=4 / 3)
-    assert camera.side == 0
-    assert np.sign(camera.towards[0]) == sense
+    normals = np.array(cuts, float)
+    camera = camera_for(points, 4 / 3, normals)
+    assert (normals @ camera.towards > 0.25).all()
+    assert max(normals @ camera.towards) > 0.8
+    behind = camera_for(points, 4 / 3, -normals)
+    assert (normals @ behind.towards < -0.25).all()
+
+
+def test_a_half_is_seen_from_its_cut_with_the_walls_of_its_cavity() -> None:
+    body = Body(hollow_finger(half=True))
+    drawing = drawing_of(body)
+    assert drawing.cuts.tolist() == [[0.0, -1.0, 0.0]]
+    faces = {tuple(sorted(face)) for face in outside_faces(body.mesh).tolist()}
+    assert {tuple(sorted(face)) for face in body.mesh.surface("cavity").tolist()} < faces
+    try:
+        drawn = draw(body, [bent_record(body.mesh, 0, 0.01)], ["40 kPa"], 0.08)
+    except MissingPackageError as error:
+        pytest.skip(str(error))
+    assert drawn.last_label == "40 kPa, from outside"
+    assert drawn.last is not None
+    # From the cut one looks into the cavity, whose corners are seen; from outside upon a smooth wall.
+    inside, outside = (
+        np.abs(np.diff(pixels(png)[150:550].mean(axis=2), axis=0)) for png in (drawn.states[0], drawn.last)
+    )
+    assert (inside > 3.0).sum() > 1.2 * (outside > 3.0).sum()
 
 
 def test_the_outside_leaves_the_cavity_out(finger: Mesh) -> None:

@@ -155,7 +155,7 @@ def _fields(record: StepRecord) -> dict[str, object]:
 
 
 def test_curves_have_a_file_and_a_figure_and_survive_a_resume(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report_module, "draw", lambda _, records, *__: Pictures((b"a",) * len(records), None))
+    monkeypatch.setattr(report_module, "draw", lambda _, records, *__: Pictures((b"a",) * len(records)))
     finger = hollow_finger((12, 3, 3))
     wanted = ["bending_angle", {"centreline": {"stations": 9}}, {"centreline": {"stations": 7, "name": "short"}}]
     choices = [Choice.read(choice) for choice in wanted]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from results.hollow_finger import CASE, bent_record, finished_run
+from results.hollow_finger import CASE, bent_record, finished_run, hollow_finger
 
 from turgor.common.errors import InputError, MissingPackageError
 from turgor.mesh.mesh import Mesh
@@ -90,7 +90,9 @@ def frames_of(html: str) -> dict[str, Any]:
 
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report_module, "draw", lambda _, records, *__: Pictures((b"a",) * len(records), b"b"))
+    monkeypatch.setattr(
+        report_module, "draw", lambda _, records, *__: Pictures((b"a",) * len(records), b"b", "cut open")
+    )
 
 
 @pytest.fixture
@@ -149,6 +151,16 @@ def test_the_fit_has_its_own_section(folder: Path) -> None:
     assert "ogden-1 (recommended) mu1 = 0.02, alpha1 = 2.4 5.000e−04 0.999 no" in words
     assert "yeoh-3 – – – no" in words
     assert "the best of all" in words
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_the_report_of_a_half_says_so(tmp_path: Path, folder: Path) -> None:
+    half = hollow_finger((6, 4, 3), half=True)
+    with RunStore.create(tmp_path / "half", half, CASE) as store:
+        store.append(bent_record(half, 0, 1.0))
+    said = "volumes and forces are those of this half"
+    assert said in Page(report(tmp_path / "half").read_text(encoding="utf-8")).words
+    assert said not in Page(report(folder).read_text(encoding="utf-8")).words
 
 
 @pytest.mark.usefixtures("without_pictures")

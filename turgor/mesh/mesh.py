@@ -112,6 +112,11 @@ class Mesh:
         """Number of cells."""
         return len(self.cells)
 
+    @property
+    def symmetry_planes(self) -> tuple[str, ...]:
+        """Names of the surfaces, ``symmetry…``, behind which the body goes on as its mirror image."""
+        return tuple(name for name in self.surfaces if name.startswith("symmetry"))
+
     def region(self, name: str) -> IntArray:
         """Return the cell indices of a region; raise InputError if there is none of that name."""
         return _named(self.regions, name, "region")

@@ -14,9 +14,6 @@ AZIMUTH, ELEVATION = float(np.radians(28.0)), float(np.radians(18.0))
 
 _MARGIN = 1.08
 
-_IN_PLANE = 1e-6
-"""A body begins in a plane if its distance is no more than this part of its extent."""
-
 
 @dataclass(frozen=True)
 class Camera:
@@ -33,7 +30,7 @@ class Camera:
     half_height
         Half of the picture's height in mm.
     side
-        Coordinate axis, 0 to 2, that the camera looks along most: the one across which the body moves least.
+        Coordinate axis, 0 to 2, that the camera looks along most.
     """
 
     target: FloatArray
@@ -43,12 +40,12 @@ class Camera:
     side: int
 
 
-def camera_for(points: FloatArray, aspect: float, side: int | None = None) -> Camera:
+def camera_for(points: FloatArray, aspect: float, cuts: FloatArray | None = None) -> Camera:
     """Return the camera that sees all `points` ``(n, 3)`` in a picture of width/height `aspect`.
 
-    It looks from the side at the plane of the motion, turned and raised a little so that depth shows; straight at a
-    body that is flat. Up is z, or y where z is the direction it looks along. Into a body cut by the plane x = 0 it
-    looks from the cut.
+    It looks from the side at the plane of the motion, across which the body moves least, turned and raised a little so
+    that depth shows; straight at a body that is flat. Up is z, or y where z is the direction it looks along. Into a
+    body that is cut it looks from the cut, and if there are several, so that it sees all of them.
 
     Parameters
     ----------
@@ -56,17 +53,21 @@ def camera_for(points: FloatArray, aspect: float, side: int | None = None) -> Ca
         What is to be seen.
     aspect
         Width over height.
-    side
-        Coordinate axis to look along; left out, that of least extent.
+    cuts
+        Unit vectors along the axes out of the planes that the body is cut by, ``(c, 3)``.
     """
     extents = np.ptp(points, axis=0)
-    side = int(np.argmin(extents)) if side is None else side
+    cuts = np.zeros((0, 3)) if cuts is None else cuts
+    open_sides = np.flatnonzero(np.any(cuts, axis=0)) if len(cuts) else np.arange(3)
+    side = int(open_sides[np.argmin(extents[open_sides])])
     azimuth, elevation = (AZIMUTH, ELEVATION) if extents[side] > 0.0 else (0.0, 0.0)
     vertical = np.eye(3)[1 if side == 2 else 2]
     # Looking along +y with z up (and along −x or −z alike) leaves the first in-plane axis pointing right.
-    from_cut = side == 0 and abs(points[:, 0].min()) <= _IN_PLANE * extents[0]
-    facing = np.eye(3)[side] * (-1.0 if side == 1 or from_cut else 1.0)
+    facing = np.eye(3)[side] * (-1.0 if side == 1 else 1.0)
+    facing = next((cut for cut in cuts if cut[side]), facing)
     across = np.cross(vertical, facing)
+    azimuth *= -1.0 if (cuts @ across < 0.0).any() else 1.0
+    elevation *= -1.0 if (cuts @ vertical < 0.0).any() else 1.0
     level = np.cos(azimuth) * facing + np.sin(azimuth) * across
     towards = np.cos(elevation) * level + np.sin(elevation) * vertical
     right = np.cross(vertical, towards)

@@ -20,9 +20,6 @@ FloatArray = npt.NDArray[np.float64]
 SHOWN_TURN = 1.5 * math.pi
 """Part of the full turn of a body of revolution that is drawn; the quarter before the camera is left out."""
 
-CUT_SIDE = 2
-"""Coordinate axis along which to look at it, so that the cut is seen."""
-
 SEGMENTS = 18
 """Curved faces along it."""
 
@@ -37,12 +34,15 @@ class Drawing:
         Drawn points of each six-node triangle, ``(k, 6)``, turning outward.
     source
         Node of the mesh that each drawn point follows, ``(p,)``.
+    cuts
+        Unit vectors along the axes out of the planes that the body is cut by, ``(c, 3)``.
     turn
         Angle in rad by which each is turned about the y axis, ``(p,)``; ``None`` for a body that is not revolved.
     """
 
     faces: IntArray
     source: IntArray
+    cuts: FloatArray
     turn: FloatArray | None = None
 
     def places(self, positions: FloatArray) -> FloatArray:
@@ -61,7 +61,19 @@ def drawing_of(body: Body) -> Drawing:
         return _revolved(mesh)
     faces = six_node_triangles(outside_faces(mesh) if body.kind == "space" else mesh.cells)
     nodes, compacted = compact(faces)
-    return Drawing(compacted, nodes)
+    return Drawing(compacted, nodes, _cuts(mesh))
+
+
+def _cuts(mesh: Mesh) -> FloatArray:
+    """Return the axes, with their signs, that the planes of symmetry of a body in space face most."""
+    names = mesh.symmetry_planes if mesh.dimension == 3 else ()
+    cuts = np.zeros((len(names), 3))
+    for cut, name in zip(cuts, names, strict=True):
+        a, b, c = np.moveaxis(mesh.points[mesh.surface(name)[:, :3]], 1, 0)
+        normal = np.cross(b - a, c - a).sum(axis=0)
+        axis = int(np.argmax(np.abs(normal)))
+        cut[axis] = np.sign(normal[axis])
+    return cuts
 
 
 def _revolved(mesh: Mesh) -> Drawing:
@@ -87,4 +99,5 @@ def _revolved(mesh: Mesh) -> Drawing:
     faces = np.vstack([six_node_triangles(swept)[area], cap, last])
     points, compacted = compact(faces)
     level, source = np.divmod(points, n)
-    return Drawing(compacted, np.asarray(source, dtype=np.int32), turns[level])
+    # Looked at along z, the quarter that is left out lies before the camera.
+    return Drawing(compacted, np.asarray(source, dtype=np.int32), np.array([[0.0, 0.0, 1.0]]), turns[level])

@@ -19,8 +19,8 @@ import numpy as np
 
 from turgor.common.errors import MissingPackageError
 from turgor.common.optional import is_available, library_advice
-from turgor.results.camera import camera_for
-from turgor.results.drawing import CUT_SIDE, drawing_of
+from turgor.results.camera import Camera, camera_for
+from turgor.results.drawing import drawing_of
 from turgor.results.record import StepRecord
 from turgor.results.stored import Body
 
@@ -36,13 +36,15 @@ _GRAPHICS_ADVICE = (
 
 @dataclass(frozen=True)
 class Pictures:
-    """PNG files as bytes: the whole body in each state, and the last state cut open along its side plane.
+    """PNG files as bytes: the body in each state, and of a body in space the last state once more, and what it shows.
 
-    A plane section has nothing to cut, and a body of revolution is drawn cut open in every state.
+    That is the body cut open along its side plane. One that planes of symmetry cut is seen from these cuts in every
+    state, and the last time from outside.
     """
 
     states: tuple[bytes, ...]
-    section: bytes | None
+    last: bytes | None = None
+    last_label: str = ""
 
 
 def draw(body: Body, records: Sequence[StepRecord], labels: Sequence[str], scale_max: float) -> Pictures:
@@ -69,34 +71,44 @@ def draw(body: Body, records: Sequence[StepRecord], labels: Sequence[str], scale
     drawing, mesh = drawing_of(body), body.mesh
     positions = [mesh.points, *(mesh.points + record.displacement for record in records)]
     places = np.array([drawing.places(here) for here in positions])
-    camera = camera_for(np.concatenate(places), SIZE[0] / SIZE[1], CUT_SIDE if body.kind == "axisymmetric" else None)
+    seen, aspect = np.concatenate(places), SIZE[0] / SIZE[1]
     arrays: dict[str, Any] = {
         "places": places,
         "faces": drawing.faces,
         "von_mises": np.array([record.von_mises[drawing.source] for record in records]),
-        "target": camera.target,
-        "towards": camera.towards,
-        "up": camera.up,
     }
-    if body.kind == "space":
-        last = records[-1]
-        arrays |= {"points": mesh.points, "moved": mesh.points + last.displacement, "cells": mesh.cells}
-        arrays |= {"nodal": last.von_mises}
-    scene = {
+    scene: dict[str, Any] = {
         "labels": list(labels),
         "scale_max": scale_max,
         "size": SIZE,
-        "half_height": camera.half_height,
-        "side": camera.side,
+        "camera": _plain(camera_for(seen, aspect, drawing.cuts)),
     }
+    if body.kind == "space" and len(drawing.cuts):
+        scene |= {"outside": _plain(camera_for(seen, aspect, -drawing.cuts))}
+        scene |= {"last_label": f"{labels[-1]}, from outside"}
+    elif body.kind == "space":
+        arrays |= {"points": mesh.points, "moved": positions[-1], "cells": mesh.cells, "nodal": records[-1].von_mises}
+        scene |= {"last_label": f"{labels[-1]}, cut open"}
     with tempfile.TemporaryDirectory(prefix="turgor-") as name:
         folder = Path(name)
         np.savez(folder / "job.npz", **arrays)
         (folder / "job.json").write_text(json.dumps(scene), encoding="utf-8")
         _render(folder)
         states = tuple((folder / f"state-{k}.png").read_bytes() for k in range(len(records)))
-        section = folder / "section.png"
-        return Pictures(states, section.read_bytes() if section.exists() else None)
+        if "last_label" not in scene:
+            return Pictures(states)
+        return Pictures(states, (folder / "last.png").read_bytes(), scene["last_label"])
+
+
+def _plain(camera: Camera) -> dict[str, Any]:
+    """Return a camera as plain values."""
+    return {
+        "target": camera.target.tolist(),
+        "towards": camera.towards.tolist(),
+        "up": camera.up.tolist(),
+        "half_height": camera.half_height,
+        "side": camera.side,
+    }
 
 
 def _render(folder: Path) -> None:

@@ -28,20 +28,24 @@ _CELLS = {10: pyvista.CellType.QUADRATIC_TETRA, 27: pyvista.CellType.TRIQUADRATI
 
 
 def main(folder: Path) -> None:
-    """Draw the job in `folder`: ``state-0.png``, ``state-1.png``, … and of a body in space ``section.png``."""
+    """Draw the job in `folder`: ``state-0.png``, ``state-1.png``, … and of a body in space ``last.png``.
+
+    That is the last state cut open, or from outside where a second camera is given.
+    """
     # Without a screen VTK falls back to EGL by itself, but warns on the way about the X server it did not find.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     vtkObject.GlobalWarningDisplayOff()
     scene = json.loads((folder / "job.json").read_text(encoding="utf-8"))
     with np.load(folder / "job.npz", allow_pickle=False) as job:
         arrays = {name: job[name] for name in job.files}
-    outline = _edges(_skin(arrays, None))
+    rest = _skin(arrays, None)
     for state, label in enumerate(scene["labels"]):
-        body = _skin(arrays, state)
-        _save(folder / f"state-{state}.png", body, outline, label, scene, arrays)
+        _save(folder / f"state-{state}.png", _skin(arrays, state), rest, label, scene, scene["camera"])
     if "cells" in arrays:
-        label = f"{scene['labels'][-1]}, cut open"
-        _save(folder / "section.png", _section(arrays, scene["side"]), None, label, scene, arrays)
+        _save(folder / "last.png", _section(arrays, scene["camera"]), None, scene["last_label"], scene, scene["camera"])
+    elif "outside" in scene:
+        last = _skin(arrays, len(scene["labels"]) - 1)
+        _save(folder / "last.png", last, rest, scene["last_label"], scene, scene["outside"])
 
 
 def _skin(arrays: dict[str, npt.NDArray[Any]], state: int | None) -> Any:
@@ -53,11 +57,12 @@ def _skin(arrays: dict[str, npt.NDArray[Any]], state: int | None) -> Any:
     return _smooth(grid)
 
 
-def _section(arrays: dict[str, npt.NDArray[Any]], side: int) -> Any:
-    """The half of the last state behind the plane that halves the body's extent along the coordinate `side` at rest."""
+def _section(arrays: dict[str, npt.NDArray[Any]], camera: dict[str, Any]) -> Any:
+    """The half of the last state behind the plane across the camera's side that halves the body's extent at rest."""
+    side = camera["side"]
     reference = arrays["points"][:, side]
     across = reference - 0.5 * (reference.min() + reference.max())
-    behind = across * -np.sign(arrays["towards"][side])
+    behind = across * -np.sign(camera["towards"][side])
     kind = _CELLS[arrays["cells"].shape[1]]
     grid = pyvista.UnstructuredGrid({kind: arrays["cells"]}, arrays["moved"])
     grid.point_data[_STRESS] = arrays["nodal"]
@@ -70,18 +75,15 @@ def _smooth(grid: Any) -> Any:
     return surface.compute_normals(split_vertices=True, feature_angle=_EDGE_ANGLE_DEG, auto_orient_normals=False)
 
 
-def _edges(surface: Any) -> Any:
-    return surface.clean().extract_feature_edges(_EDGE_ANGLE_DEG, boundary_edges=True, manifold_edges=False)
-
-
-def _save(
-    path: Path, body: Any, outline: Any, label: str, scene: dict[str, Any], arrays: dict[str, npt.NDArray[Any]]
-) -> None:
+def _save(path: Path, body: Any, rest: Any, label: str, scene: dict[str, Any], camera: dict[str, Any]) -> None:
+    """Draw a state in colours, and of the body at rest, if given, the sharp edges and the outline."""
     plotter = pyvista.Plotter(off_screen=True, window_size=scene["size"])
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    if outline is not None and outline.n_points:
-        plotter.add_mesh(outline, color=_OUTLINE, line_width=2.0)
+    if rest is not None:
+        plotter.add_silhouette(
+            rest.clean(), color=_OUTLINE, line_width=2.0, feature_angle=_EDGE_ANGLE_DEG, decimate=None
+        )
     plotter.add_mesh(
         body,
         scalars=_STRESS,
@@ -108,21 +110,23 @@ def _save(
     )
     plotter.scalar_bars[_STRESS].SetVerticalTitleSeparation(16)
     plotter.add_text(label, position=(24, scene["size"][1] - 60), font_size=20, color=_INK)
-    _aim(plotter.camera, scene["half_height"], arrays)
+    _aim(plotter.camera, camera)
     plotter.renderer.ResetCameraClippingRange()
     plotter.screenshot(str(path))
     plotter.close()
 
 
-def _aim(camera: Any, half_height: float, arrays: dict[str, npt.NDArray[Any]]) -> None:
+def _aim(camera: Any, view: dict[str, Any]) -> None:
     """Look at the target, between the colour bar and the label."""
     left = 1.0 - _BAR_PART - _LABEL_PART
+    target, towards, up = (np.array(view[name]) for name in ("target", "towards", "up"))
+    half_height = view["half_height"]
     camera.parallel_projection = True
     camera.parallel_scale = half_height / left
-    focus = arrays["target"] - (_BAR_PART - _LABEL_PART) / left * half_height * arrays["up"]
+    focus = target - (_BAR_PART - _LABEL_PART) / left * half_height * up
     camera.focal_point = focus
-    camera.position = focus + 10.0 * half_height * arrays["towards"]
-    camera.up = arrays["up"]
+    camera.position = focus + 10.0 * half_height * towards
+    camera.up = up
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ from turgor.mesh.quality import quality
 from turgor.results import animation, curve_plots, plots
 from turgor.results.archive import Row
 from turgor.results.camera import camera_for
-from turgor.results.drawing import CUT_SIDE
 from turgor.results.files import write_text
 from turgor.results.measures import evaluate
 from turgor.results.pictures import draw
@@ -34,6 +33,9 @@ _N_PICTURES = 5
 _N_MODES = 2
 _MODE_SIZE = 0.1
 """Largest displacement of a mode in its picture, in parts of the size of the body."""
+
+_PARTS = {1: "half", 2: "quarter", 3: "eighth"}
+"""What is left of a body by the number of planes of symmetry that cut it."""
 
 _SCENE_ASPECT = 1.6
 _SIGNIFICANT = 4
@@ -136,12 +138,12 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     stresses = [np.zeros(len(surface.nodes)), *(surface.values(record.von_mises) for record in records)]
     labels = ["at rest", *(_frame_label(history, index, load) for index in shown)]
     box = animation.bounds(positions)
-    side = CUT_SIDE if store.body.kind == "axisymmetric" else None
-    camera = camera_for(np.concatenate(positions), _SCENE_ASPECT, side)
+    camera = camera_for(np.concatenate(positions), _SCENE_ASPECT, surface.drawing.cuts)
     pictures, note = _pictures(store, history, load, scale_max)
     curve = [_rest_row(store, history[0]), *history] if history[0]["fraction"] > 0.0 else history
     return {
         "cards": _cards(history),
+        "part": _PARTS.get(len(store.mesh.symmetry_planes)),
         "motion": _as_json(plots.load_motion(curve)),
         "extra": _extra_figures(store, curve),
         "scene": _as_json(plots.body_scene(box.low, box.high, camera, scale_max)),
@@ -221,9 +223,9 @@ def _pictures(
     except MissingPackageError as error:
         return [], str(error)
     captions, files = list(labels), list(drawn.states)
-    if drawn.section is not None:
-        captions.append(f"{labels[-1]}, cut open")
-        files.append(drawn.section)
+    if drawn.last is not None:
+        captions.append(drawn.last_label)
+        files.append(drawn.last)
     return [Picture(text, _data_address(file)) for text, file in zip(captions, files, strict=True)], None
 
 

@@ -13,7 +13,7 @@ from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
 
 CAVITY_PREFIX = "cavity"
-"""Surfaces whose name begins so look into a cavity; nobody sees them from outside."""
+"""Surfaces whose name begins so look into a cavity; nobody sees them from outside of a whole body."""
 
 _QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """The four flat triangles between the corners and the middles of a six-node triangle."""
@@ -28,13 +28,14 @@ _HALVES = np.array([[0, 1, 2, 4, 5, 8], [0, 2, 3, 8, 6, 7]])
 
 
 def outside_faces(mesh: Mesh) -> IntArray:
-    """Return the boundary faces that do not look into a cavity, shape ``(k, nodes_per_face)``.
+    """Return the boundary faces that can be seen, shape ``(k, nodes_per_face)``.
 
-    A body whose every face belongs to a cavity is returned whole.
+    Those of a whole body that look into a cavity cannot; if a plane of symmetry cuts it, they can. A body whose every
+    face belongs to a cavity is returned whole.
     """
     faces = boundary_faces(mesh.cells)
     hidden = [corners for name, corners in mesh.surfaces.items() if name.startswith(CAVITY_PREFIX)]
-    if not hidden:
+    if not hidden or mesh.symmetry_planes:
         return faces
     inside = np.unique(_keys(np.concatenate(hidden), mesh.n_points))
     visible = ~np.isin(_keys(faces, mesh.n_points), inside)

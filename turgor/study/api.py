@@ -36,7 +36,7 @@ class Model:
         The actuator.
     supports
         What holds it, each as in a case file: ``{"type": "clamped", "surface": "mount"}``. Left out, the surface
-        ``mount`` is clamped and the surfaces ``symmetry`` or ``symmetry-…``, if there are any, slide.
+        ``mount`` is clamped and the surfaces ``symmetry…``, if there are any, slide.
     loads
         What acts on it besides the pressure, each as in a case file: ``{"type": "gravity"}``.
     contact
@@ -229,8 +229,8 @@ def _check_steps(steps: int) -> None:
 
 
 def _default_supports(mesh: Mesh) -> list[dict[str, str]]:
-    planes = [name for name in mesh.surfaces if name == "symmetry" or name.startswith("symmetry-")]
-    return [{"type": "clamped", "surface": "mount"}, *({"type": "sliding", "surface": name} for name in planes)]
+    sliding = [{"type": "sliding", "surface": name} for name in mesh.symmetry_planes]
+    return [{"type": "clamped", "surface": "mount"}, *sliding]
 
 
 def _cavities(mesh: Mesh) -> list[str]:

@@ -50,8 +50,8 @@ def mesh_case(case: Draft, picture: str | Path | None = None) -> Mesh:
     for fault in faults_of_names(case, mesh):
         log.warning("%s", fault)
     held = {support.surface for support in case.supports}
-    for name in mesh.surfaces:
-        if held and name.startswith("symmetry") and name not in held:
+    for name in mesh.symmetry_planes:
+        if held and name not in held:
             log.warning("supports: nothing holds the cut '%s'; a run needs {type: sliding, surface: %s}", name, name)
     return mesh
 
