@@ -95,6 +95,23 @@ def test_too_much_overlap_is_blamed_on_contact():
     assert stopped(system, grown(system, 1.1), error).outcome is Outcome.CONTACT
 
 
+def test_a_crease_is_told_from_a_distorted_element():
+    # A block between two walls that come together, on a third; its top is free (Hong, Zhao and Suo 2009: 0.645).
+    mesh = rectangle((2.0, 1.0), (4, 2), "quad9")
+    supports = [Sliding("x0"), Sliding("y0"), Prescribed("x1", (-0.8, None))]
+    system = System(mesh, {"body": neo_hookean()}, supports, section=PlaneStrain())
+    for stretch, outcome in ((0.66, Outcome.UNEXPLAINED), (0.63, Outcome.CREASE)):
+        u = mesh.points * [stretch - 1.0, 1.0 / stretch - 1.0]
+        here = Equilibrium(system.consistent(u, system.loads_at(1.0)), 1.0, (0.0,), 1, 0)
+        error = stopped(system, here, NotConvergedError("an element would turn inside out"))
+        assert error.outcome is outcome
+    assert error.facts["creased_at_mm"][1] == pytest.approx(1.0)
+    assert error.facts["surface_stretches"] == pytest.approx([0.63, 1.0, 1.0 / 0.63], abs=1e-4)
+    # held all around there is no free surface to fold
+    whole = System(mesh, {"body": neo_hookean()}, [Sliding(name) for name in mesh.surfaces], section=PlaneStrain())
+    assert stopped(whole, here, NotConvergedError("the iteration wanders")).outcome is Outcome.UNEXPLAINED
+
+
 def test_a_compressed_column_bifurcates_and_shows_how():
     # Euler's column between a clamped and a guided end buckles at ε ≈ π² (h/L)²/12, the stouter the later.
     length, height = 10.0, 1.0

@@ -21,6 +21,7 @@ class Outcome(StrEnum):
     LIMIT = "limit-pressure"
     BIFURCATION = "bifurcation"
     MATERIAL = "material-unstable"
+    CREASE = "surface-creased"
     MESH = "mesh-distorted"
     CONTACT = "contact"
     UNEXPLAINED = "not-converged"

@@ -9,13 +9,22 @@ import numpy as np
 from turgor.common.errors import SolverError
 from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.loads import Pressure
+from turgor.fem.surface import surface_stretches
 from turgor.fem.system import System
 from turgor.materials.stability import drucker_margin, verdict
+from turgor.mesh.faces import boundary_faces
 from turgor.solver.events import Outcome
 from turgor.solver.newton import Equilibrium, NotConvergedError
 from turgor.solver.volume import LimitPoint
 
 Facts = dict[str, object]
+
+CREASED = 2.4
+"""Stretch along the normal of a free surface, over the smallest one in it, beyond which rubber folds into creases.
+
+In plane strain a compression to 0.65 (Hong, Zhao and Suo 2009; Hohlfeld and Mahadevan 2011); at 3.4, or 0.54, a flat
+surface is unstable even against small waves (Biot 1963). A crease has no size of its own: no finer mesh gets past it.
+"""
 
 DISTORTED = 0.3
 """Smallest det F at an integration point below which the mesh is to blame: in the continuum it stays near 1."""
@@ -54,6 +63,22 @@ class WorstPoint:
     stretches: tuple[float, ...]
     margin: float
     verdict: str
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where the free surface is compressed most in a state: the reference position and the principal stretches.
+
+    The smaller and the larger one in the surface, and the one along its normal.
+    """
+
+    place: tuple[float, ...]
+    stretches: tuple[float, ...]
+
+    @property
+    def ratio(self) -> float:
+        """The stretch along the normal over the smallest one in the surface."""
+        return self.stretches[2] / self.stretches[0]
 
 
 def stopped(system: System, here: Equilibrium, error: NotConvergedError) -> StoppedShortError:
@@ -129,6 +154,21 @@ def worst_point(system: System, here: Equilibrium) -> WorstPoint:
     return min(found, key=lambda point: point.margin)
 
 
+def deepest_fold(system: System, here: Equilibrium) -> Fold | None:
+    """Return where the surface that nothing holds is nearest to a crease; ``None`` if all of it is held."""
+    faces = boundary_faces(system.mesh.cells)
+    held = np.asarray(system.constraints.fixed[: system.mesh.n_points].any(axis=1))
+    faces = faces[~held[faces].all(axis=1)]
+    if not len(faces):
+        return None
+    u = system.body_part(here.state.u)
+    stretches, places = surface_stretches(system.mesh.points, u, faces, system.section)
+    ratio = stretches[:, :, 2] / stretches[:, :, 0]
+    worst = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    place = tuple(round(float(x), 3) for x in places[worst])
+    return Fold(place, tuple(round(float(x), 4) for x in stretches[worst]))
+
+
 def _cause(system: System, here: Equilibrium, error: NotConvergedError) -> tuple[Outcome, str, str, Facts]:
     """Return the class of a failure, the cause in words, what to try, and the facts that speak for it."""
     overlap = error.facts.get("overlap_per_wall")
@@ -138,6 +178,9 @@ def _cause(system: System, here: Equilibrium, error: NotConvergedError) -> tuple
     worst = worst_point(system, here)
     if worst.margin < 0.0:
         return _material(worst)
+    fold = deepest_fold(system, here)
+    if fold is not None and fold.ratio > CREASED:
+        return _creased(fold)
     smallest, cell = system.worst_jacobian(here.state.u)
     if smallest < DISTORTED:
         place = [round(float(x), 3) for x in system.mesh.points[system.mesh.cells[cell]].mean(axis=0)]
@@ -154,6 +197,20 @@ def _cause(system: System, here: Equilibrium, error: NotConvergedError) -> tuple
     cause = "the material and the elements are sound there"
     advice = "Try smaller steps (solver.smallest_step), a finer mesh, or control by volume (control.type: volume)"
     return Outcome.UNEXPLAINED, cause, advice, {"smallest_drucker_margin": worst.margin, "smallest_det_F": smallest}
+
+
+def _creased(fold: Fold) -> tuple[Outcome, str, str, Facts]:
+    cause = (
+        f"the surface near ({', '.join(f'{x:g}' for x in fold.place)}) mm is compressed to {fold.stretches[0]:.2g} "
+        "of its length, where rubber folds into creases"
+    )
+    advice = "Try a rounder corner or a thicker wall there; a finer mesh meets the crease too"
+    facts: Facts = {
+        "creased_at_mm": list(fold.place),
+        "surface_stretches": list(fold.stretches),
+        "normal_over_smallest_stretch": fold.ratio,
+    }
+    return Outcome.CREASE, cause, advice, facts
 
 
 def _material(worst: WorstPoint) -> tuple[Outcome, str, str, Facts]:
