@@ -57,6 +57,20 @@ def test_what_is_written_is_read_back_to_the_last_bit(dimension: str, number: fl
     assert to_internal(to_text(number, dimension), dimension) == number
 
 
+@pytest.mark.parametrize(
+    ("text", "dimension"),
+    [
+        ("12 psi", "pressure"),
+        ("50 kPa", "pressure"),
+        ("51 deg", "angle"),
+        ("3 mm", "length"),
+        ("1.2542 MPa", "pressure"),
+    ],
+)
+def test_what_people_write_is_written_as_they_do(text: str, dimension: str) -> None:
+    assert to_text(to_internal(text, dimension), dimension) == text
+
+
 def test_a_pint_quantity_is_taken() -> None:
     assert to_internal(registry().Quantity(2.0, "cm"), "length") == pytest.approx(20.0)
 

@@ -18,7 +18,7 @@ from turgor.common.errors import InputError, MissingPackageError
 from turgor.mesh.mesh import Mesh
 from turgor.results import animation, plots
 from turgor.results import report as report_module
-from turgor.results.curve_plots import over_displacement
+from turgor.results.curve_plots import all_zero, groups, line, over_displacement
 from turgor.results.pictures import Pictures
 from turgor.results.report import number, report
 from turgor.results.store import RunStore
@@ -219,6 +219,36 @@ def test_curves_begin_at_rest_and_mark_unstable_states(tmp_path: Path, small_fin
     assert rest["cavity_volume_mm3"] == pytest.approx(small_finger.enclosed_volume("cavity"))
 
 
+def test_a_section_of_zeros_is_told_in_words() -> None:
+    history = [{"pressure_kPa": float(p), "contact_self_area_mm2": 0.0, "stable": True} for p in (0, 10, 20)]
+    axes = groups(history)["Contact"]
+    assert all_zero(history, axes)
+    history[-1]["contact_self_area_mm2"] = 0.3
+    assert not all_zero(history, axes)
+
+
+def test_diagrams_leave_room_for_titles_and_legends_between_them() -> None:
+    for rows in (2, 3):
+        figure = plots.panels(rows, plots.HEIGHT)
+        plots.finish(figure, plots.HEIGHT * rows)
+        margin = figure.layout.margin
+        drawn = figure.layout.height - margin.t - margin.b
+        upper, lower = figure.layout.yaxis.domain, figure.layout.yaxis3.domain
+        assert (upper[0] - lower[1]) * drawn == pytest.approx(96.0)
+
+
+def test_lines_of_a_curve_are_named_by_load_and_unit() -> None:
+    rows = [
+        {"step": step, "pressure_kPa": p, "curvature_per_mm": 0.1, "torsion_per_mm": 0.0}
+        | {f"{axis}_mm": float(place) for axis in "sxyz"}
+        for step, p in enumerate((10.0, 20.684))
+        for place in range(3)
+    ]
+    assert [trace.name for trace in line(rows).data[:2]] == ["10 kPa", "20.68 kPa"]
+    programme = [{**row, "time_s": 2.0 * row["step"]} for row in rows]
+    assert [trace.name for trace in line(programme).data[:2]] == ["0 s", "2 s"]
+
+
 def test_angles_that_are_noise_are_left_out(run_folder: Path) -> None:
     history = RunStore.open(run_folder).history
     assert plots.turns("bending_angle_deg", history)
@@ -246,6 +276,7 @@ def test_frames_keep_to_their_budget() -> None:
         (0.088, "0.088"),
         (6079.9993, "6080"),
         (31234.6, "31235"),
+        (140370.2, "140370"),
         (-12.3456, "−12.35"),
         (2.3e-5, "2.300e−05"),
         (1.5e9, "1.500e+09"),

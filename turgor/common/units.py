@@ -36,6 +36,12 @@ INTERNAL_UNITS: dict[str, str] = {
 }
 """The unit in which each dimension is kept inside."""
 
+USUAL_UNITS: dict[str, tuple[str, ...]] = {"pressure": ("kPa", "psi", "bar"), "angle": ("deg",)}
+"""What else people write some dimensions in."""
+
+_LONG = 10
+"""Digits that nobody writes: a number that needs so many is the same to a reader in every unit."""
+
 EXAMPLES: dict[str, str] = {
     "length": "3 mm",
     "area": "18 mm^2",
@@ -108,10 +114,18 @@ def from_internal(number: float, dimension: str, unit: str | None = None) -> flo
     return float(registry().Quantity(number, INTERNAL_UNITS[dimension]).to(unit).magnitude)
 
 
-def to_text(number: float, dimension: str, unit: str | None = None) -> str:
-    """Write an internal `number` as text with its unit; reading it back returns the same number."""
-    chosen = unit or INTERNAL_UNITS[dimension]
-    return f"{from_internal(number, dimension, unit):.17g} {chosen}" if unit else f"{number!r} {chosen}"
+def to_text(number: float, dimension: str) -> str:
+    """Write an internal `number` as text with its unit; reading it back returns the same number.
+
+    Of the usual units it takes the one in which that is shortest: 12 psi, not 0.08273708751802035 MPa.
+    """
+    short = f"{number:.15g}"
+    shortest, unit = (short if float(short) == number else repr(number)), INTERNAL_UNITS[dimension]
+    for other in USUAL_UNITS.get(dimension, ()):
+        text = f"{from_internal(number, dimension, other):.15g}"
+        if len(text) < min(len(shortest), _LONG) and to_internal(f"{text} {other}", dimension) == number:
+            shortest, unit = text, other
+    return f"{shortest} {unit}"
 
 
 _QUANTITY = re.compile(

@@ -8,17 +8,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
-from plotly.subplots import make_subplots
 
 from turgor.results.archive import Row
-from turgor.results.plots import COLORSCALE, SERIES, finish, line_trace, load_axis
-
-_COLUMNS = 2
+from turgor.results.plots import COLORSCALE, COLUMNS, HEIGHT, SERIES, Quantity, finish, line_trace, load_axis, panels
 
 _KINDS = (
     ("Contact", "contact_", "_force_N", "Force / N"),
-    ("Contact", "contact_", "_overlap_per_wall", "Overlap / wall"),
-    ("Contact", "contact_", "_gap_per_wall", "Smallest gap / wall"),
+    ("Contact", "contact_", "_overlap_per_wall", "Overlap in parts of the wall"),
+    ("Contact", "contact_", "_gap_per_wall", "Smallest gap in parts of the wall"),
     ("Contact", "contact_", "_displacement_mm", "Displacement of the body / mm"),
     ("Contact", "contact_", "_area_mm2", "Area in contact / mm²"),
     ("Fibres", "fibre_", "largest_tension_N", "Largest tension / N"),
@@ -43,6 +40,11 @@ def groups(history: Sequence[Row]) -> dict[str, dict[str, list[tuple[str, str]]]
     return found
 
 
+def all_zero(history: Sequence[Row], axes: Mapping[str, Sequence[tuple[str, str]]]) -> bool:
+    """Say whether all the columns of a section are zero in every state."""
+    return not any(row.get(key) for row in history for lines in axes.values() for key, _ in lines)
+
+
 def over_load(history: Sequence[Row], axes: Mapping[str, Sequence[tuple[str, str]]]) -> go.Figure:
     """Return one diagram over the load for each axis title, with a line for each of its columns.
 
@@ -54,19 +56,19 @@ def over_load(history: Sequence[Row], axes: Mapping[str, Sequence[tuple[str, str
         Axis title → key of a column and name of its line.
     """
     load = load_axis(history)
-    rows = -(-len(axes) // _COLUMNS)
-    figure = make_subplots(rows=rows, cols=_COLUMNS, horizontal_spacing=0.11, vertical_spacing=0.22 / rows)
+    rows = -(-len(axes) // COLUMNS)
+    figure = panels(rows, HEIGHT)
     loads = [entry[load.key] for entry in history]
     symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]
     for place, (title, lines) in enumerate(axes.items()):
-        at = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
+        at = {"row": place // COLUMNS + 1, "col": place % COLUMNS + 1}
         for (key, name), color in zip(lines, itertools.cycle(SERIES)):
             values = [entry.get(key) for entry in history]
             trace = line_trace(loads, values, symbols, color, name=name, legend=place == 0 and len(lines) > 1)
             figure.add_trace(trace, **at)
         figure.update_xaxes(title_text=load.title, **at)
         figure.update_yaxes(title_text=title, **at)
-    finish(figure, height=320 * rows)
+    finish(figure, height=HEIGHT * rows)
     return figure
 
 
@@ -105,26 +107,34 @@ def line(rows: Sequence[Row]) -> go.Figure:
     """
     places = np.array([[row[f"{axis}_mm"] for axis in "xyz"] for row in rows])
     across, up, depth = _views(places)
-    panels = [(across, up), (depth, up), ("s", "curvature"), ("s", "torsion")]
+    shown = [(across, up), (depth, up), ("s", "curvature"), ("s", "torsion")]
     if np.ptp(places[:, "xyz".index(depth)]) == 0.0:
-        panels = [(across, up), ("s", "curvature")]
-    height = -(-len(panels) // _COLUMNS)
-    figure = make_subplots(rows=height, cols=_COLUMNS, horizontal_spacing=0.11, vertical_spacing=0.22 / height)
+        shown = [(across, up), ("s", "curvature")]
+    height = -(-len(shown) // COLUMNS)
+    figure = panels(height, _LINE_HEIGHT)
     steps = [list(group) for _, group in itertools.groupby(rows, key=lambda row: row["step"])]
     load = load_axis(rows)
-    for (first, second), place in zip(panels, itertools.count()):
-        at = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
+    for (first, second), place in zip(shown, itertools.count()):
+        at = {"row": place // COLUMNS + 1, "col": place % COLUMNS + 1}
         for number, step in enumerate(steps):
             shade = sample_colorscale(COLORSCALE, [0.9 * (1.0 - number / max(1, len(steps) - 1))])[0]
-            name = f"{load.title.split(' / ')[0]} {step[0][load.key]:.4g}"
+            name = _told(load, step[0][load.key])
             x, y = ([row[_KEYS[what]] for row in step] for what in (first, second))
             figure.add_trace(line_trace(x, y, ["circle"] * len(x), shade, name=name, legend=place == 0), **at)
         figure.update_xaxes(title_text=_TITLES[first], **at)
         figure.update_yaxes(title_text=_TITLES[second], **at)
-    finish(figure, height=400 * height)
+    finish(figure, height=_LINE_HEIGHT * height)
     figure.update_traces(marker={"size": 4})
     return figure
 
+
+def _told(load: Quantity, value: float) -> str:
+    """Write a load with its unit, or its name if it has none."""
+    name, _, unit = load.title.partition(" / ")
+    return f"{value:.4g} {unit}" if unit else f"{name} {value:.4g}"
+
+
+_LINE_HEIGHT = 420
 
 _KEYS = {axis: f"{axis}_mm" for axis in "sxyz"} | {"curvature": "curvature_per_mm", "torsion": "torsion_per_mm"}
 _TITLES = {axis: f"{axis} / mm" for axis in "xyz"} | {

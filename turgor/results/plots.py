@@ -33,6 +33,7 @@ _TIP = Quantity("tip_displacement_mm", "Tip displacement / mm")
 
 MOTION = (
     Quantity("bending_angle_deg", "Bending angle / °"),
+    Quantity("chord_angle_deg", "Chord angle / °"),
     _TIP,
     Quantity("twist_deg", "Twist / °"),
     Quantity("elongation_mm", "Elongation / mm"),
@@ -55,6 +56,19 @@ _SCENE_FILL = 0.8
 """Units of plotly's orthographic scene, of which two make its height, that half of the body's height takes up."""
 
 
+COLUMNS, HEIGHT = 2, 340
+"""Diagrams side by side, and the height of one with its titles in pixels."""
+
+_ABOVE, _BELOW, _BETWEEN = 48, 60, 96
+"""Pixels above, below and between diagrams: room for the title of an axis and for a legend."""
+
+
+def panels(rows: int, height: int) -> go.Figure:
+    """Return rows of empty diagrams, two in each, every one with its titles `height` pixels high."""
+    between = _BETWEEN / (rows * height - _ABOVE - _BELOW)
+    return make_subplots(rows=rows, cols=COLUMNS, horizontal_spacing=0.11, vertical_spacing=between)
+
+
 def load_axis(history: Sequence[Row]) -> Quantity:
     """Return what the load is told by: the time of a programme, else the pressure or the load parameter."""
     return next(quantity for quantity in _LOAD if all(quantity.key in entry for entry in history))
@@ -73,19 +87,18 @@ def load_motion(history: Sequence[Row]) -> go.Figure:
     """
     load = load_axis(history)
     shown = [quantity for quantity in MOTION if _is_worth_showing(quantity.key, history)]
-    columns = 2
     curves = [*_pressure_curve(load, history), *((load, quantity) for quantity in shown)]
-    rows = -(-len(curves) // columns)
-    figure = make_subplots(rows=rows, cols=columns, horizontal_spacing=0.11, vertical_spacing=0.22 / max(rows, 1))
+    rows = -(-len(curves) // COLUMNS)
+    figure = panels(rows, HEIGHT)
     for place, (axis, quantity) in enumerate(curves):
-        row, column = divmod(place, columns)
+        row, column = divmod(place, COLUMNS)
         for trace in _traces(quantity, [entry[axis.key] for entry in history], history):
             figure.add_trace(trace, row=row + 1, col=column + 1)
         figure.update_xaxes(title_text=axis.title, row=row + 1, col=column + 1)
         figure.update_yaxes(title_text=quantity.title, row=row + 1, col=column + 1)
-    finish(figure, height=320 * rows)
+    finish(figure, height=HEIGHT * rows)
     if _TIP in shown:
-        row, column = divmod(curves.index((load, _TIP)), columns)
+        row, column = divmod(curves.index((load, _TIP)), COLUMNS)
         corner = figure.get_subplot(row + 1, column + 1)
         figure.update_layout(legend={"x": corner.xaxis.domain[0], "y": corner.yaxis.domain[1]})
     return figure
@@ -228,11 +241,12 @@ def body_scene(low: FloatArray, high: FloatArray, camera: Camera, scale_max: flo
     margin = 0.03 * float(size.max())
     axes = {
         f"{name}axis": {
-            "title": {"text": f"{name} / mm"},
+            "title": {"text": f"{name} / mm", "font": {"size": 12}},
+            "tickfont": {"size": 10},
             "range": [float(low[number]) - margin, float(high[number]) + margin],
             "backgroundcolor": "#f6f8fa",
             "gridcolor": "#dfe4ea",
-            "nticks": max(2, round(6 * float(size[number] / size.max()))),
+            "nticks": max(2, round(5 * float(size[number] / size.max()))),
         }
         for number, name in enumerate("xyz")
     }
@@ -257,9 +271,9 @@ def finish(figure: go.Figure, height: int) -> None:
     figure.update_layout(
         template="plotly_white",
         height=height,
-        margin={"l": 70, "r": 20, "t": 48, "b": 60},
+        margin={"l": 70, "r": 20, "t": _ABOVE, "b": _BELOW},
         font={"family": "system-ui, sans-serif", "size": 13, "color": INK},
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
+        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
     )
     figure.update_xaxes(rangemode="tozero", showline=True, linecolor="#b8c0ca", ticks="outside", tickcolor="#b8c0ca")
     figure.update_yaxes(showline=True, linecolor="#b8c0ca", ticks="outside", tickcolor="#b8c0ca")

@@ -23,6 +23,7 @@ _INK, _OUTLINE = "#222222", "#8a8f98"
 _SUBDIVISIONS = 2
 _BAR_PART, _LABEL_PART = 0.16, 0.09
 """Parts of the picture's height that belong to the colour bar below and to the label above."""
+_BAR_LEFT = 0.2
 _EDGE_ANGLE_DEG = 35.0
 _CELLS = {10: pyvista.CellType.QUADRATIC_TETRA, 27: pyvista.CellType.TRIQUADRATIC_HEXAHEDRON}
 
@@ -97,19 +98,21 @@ def _save(path: Path, body: Any, rest: Any, label: str, scene: dict[str, Any], c
         scalar_bar_args={
             "title": _STRESS,
             "vertical": False,
-            "position_x": 0.2,
+            "position_x": _BAR_LEFT,
             "position_y": 0.02,
-            "width": 0.6,
-            "height": 0.13,
+            "width": 1.0 - 2.0 * _BAR_LEFT,
+            "height": 0.1,
             "color": _INK,
-            "title_font_size": 30,
             "label_font_size": 26,
             "n_labels": 3,
             "fmt": "%.3g",
         },
     )
-    plotter.scalar_bars[_STRESS].SetVerticalTitleSeparation(16)
-    plotter.add_text(label, position=(24, scene["size"][1] - 60), font_size=20, color=_INK)
+    # The bar's own title would sit on the label in its middle.
+    plotter.scalar_bars[_STRESS].SetTitle("")
+    width, height = scene["size"]
+    plotter.add_text(_STRESS, position=(_BAR_LEFT * width, _BAR_PART * height - 34), font_size=15, color=_INK)
+    plotter.add_text(label, position=(24, height - 60), font_size=20, color=_INK)
     _aim(plotter.camera, camera)
     plotter.renderer.ResetCameraClippingRange()
     plotter.screenshot(str(path))

@@ -43,6 +43,7 @@ _SIGNIFICANT = 4
 _HEADLINES = (
     ("pressure_kPa", "Pressure", "kPa"),
     ("bending_angle_deg", "Bending angle", "°"),
+    ("chord_angle_deg", "Chord angle", "°"),
     ("tip_displacement_mm", "Tip displacement", "mm"),
     ("max_displacement_mm", "Largest displacement", "mm"),
     ("tip_force_N", "Tip force", "N"),
@@ -111,7 +112,7 @@ def number(value: object) -> str:
         return ", ".join(number(entry) for entry in value)
     if not isinstance(value, float) or not math.isfinite(value):
         return str(value)
-    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
         decimals = max(0, _SIGNIFICANT - 1 - math.floor(math.log10(abs(value)))) if value else 0
         text = f"{value:.{decimals}f}"
         return (text.rstrip("0").rstrip(".") if decimals else text).replace("-", "−")
@@ -143,6 +144,7 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     curve = [_rest_row(store, history[0]), *history] if history[0]["fraction"] > 0.0 else history
     return {
         "cards": _cards(history),
+        "unstable": any(entry.get("stable") is False for entry in history),
         "part": _PARTS.get(len(store.mesh.symmetry_planes)),
         "motion": _as_json(plots.load_motion(curve)),
         "extra": _extra_figures(store, curve),
@@ -154,13 +156,18 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     }
 
 
-def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, str]]:
-    """Figures that only some runs have: what contact and fibres carry, and the measures that are curves."""
-    figures = [(title, curve_plots.over_load(history, keys)) for title, keys in curve_plots.groups(history).items()]
+def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, Any]]:
+    """Figures that only some runs have: what contact and fibres carry, and the measures that are curves.
+
+    Of a section in which all is zero only the names of what is.
+    """
+    groups = curve_plots.groups(history)
+    quiet = [title for title, axes in groups.items() if curve_plots.all_zero(history, axes)]
+    figures = [(title, curve_plots.over_load(history, axes)) for title, axes in groups.items() if title not in quiet]
     dynamometers = curve_plots.over_displacement(history)
     figures += [] if dynamometers is None else [("Force over displacement", dynamometers)]
     figures += [(title.replace("-", " ").capitalize(), curve_plots.line(rows)) for title, rows in store.curves.items()]
-    return [
+    return [{"title": title, "zero": [axis.split(" / ")[0].lower() for axis in groups[title]]} for title in quiet] + [
         {"id": f"extra-{number}", "title": title, "figure": _as_json(figure)}
         for number, (title, figure) in enumerate(figures)
     ]
