@@ -1,9 +1,9 @@
-"""Newton's iterations on the way to the loads of several actuators, each of them one factorisation.
+"""Factorisations on the way to the loads of several actuators, and the iterations made with them.
 
     .venv/bin/python benchmarks/iterations.py
 
-Prints the rows of the table in docs/theory/formulation.md: the iterations of each state, those that failed on the way
-left out. With PYTHONPATH at the checkout of another commit it counts that one's.
+Prints the rows of the table in docs/theory/formulation.md: the factorisations and the iterations of each state, those
+of attempts that failed on the way left out. With PYTHONPATH at the checkout of another commit it counts that one's.
 """
 
 from __future__ import annotations
@@ -35,8 +35,9 @@ CASES: dict[str, tuple[str, list[str], list[float]]] = {
 
 
 def counts(system: System, fractions: list[float]) -> str:
-    """Return the iterations of every state behind rest."""
-    return ", ".join(str(found.iterations) for found in solve_path(system, fractions) if found.fraction > 0.0)
+    """Return the factorisations of every state behind rest and, in brackets, its iterations."""
+    states = (found for found in solve_path(system, fractions) if found.fraction > 0.0)
+    return ", ".join(f"{found.factorisations} ({found.iterations})" for found in states)
 
 
 def strip(strength: float) -> System:
@@ -58,7 +59,7 @@ def actuator(name: str, changes: list[str]) -> System:
 
 def main() -> None:
     """Print one row a case."""
-    print("| case | iterations |\n|---|---|")
+    print("| case | factorisations (iterations) |\n|---|---|")
     ends = [counts(strip(strength), [1.0]) for strength in (1.0, 5.0, 10.0)]
     print(f"| elastica, end force 1, 5, 10 EI/L², in one step | {', '.join(ends)} |")
     for title, (name, changes, fractions) in CASES.items():

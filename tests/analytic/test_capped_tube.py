@@ -30,7 +30,7 @@ def in_one_step(system):
 
 
 def test_one_step_and_twenty_reach_the_same_displacement(system, in_one_step):
-    assert in_one_step.iterations <= 6
+    assert in_one_step.factorisations <= 6
     steps = solve_path(system, output_fractions(20))
     assert len(steps) == 20
     u = in_one_step.state.u
@@ -80,7 +80,7 @@ def test_half_of_its_section_moves_as_the_tube(system, in_one_step, kind):
     loads = [Pressure("cavity", 0.03)]
     section = System(mesh, {"body": neo_hookean(0.1047, 1000.0)}, [Clamped("mount")], loads, section=Axisymmetric())
     found = solve_path(section, [1.0])[0]
-    assert found.iterations <= 6
+    assert found.factorisations <= 6
     cavity, rest = section.cavities[0], np.zeros_like(mesh.points)
     assert cavity.volume(rest) == pytest.approx(np.pi * 6.35**2 * 86.0, rel=1e-12)
     # Meshes four times as fine: V/V0 = 2.1213 and 2.1215, tip 4.564 and 4.565 mm on the axis.

@@ -14,7 +14,7 @@ from turgor.fem.directions import Direction
 from turgor.fem.kernels import parallel
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes
+from turgor.fem.term import Mixed, add_at_nodes
 from turgor.mesh.cells import body_cell
 from turgor.mesh.mesh import Mesh
 
@@ -110,7 +110,7 @@ class FibreFamily:
     dispersion: float = 0.0
 
 
-class SpreadFibres:
+class SpreadFibres(Mixed):
     """∫ ψ(E) dV with E = H : (C − 1), H = κ 1 + (1 − 3κ) a ⊗ a, a the unit direction (Gasser et al. 2006, eq. 17).
 
     C is the whole right Cauchy–Green tensor, not its isochoric part: with the latter, fibres under tension would
@@ -163,11 +163,9 @@ class SpreadFibres:
         """Return the work of the lagged fibre stress, N mm."""
         return 0.5 * float(np.sum(lagged * self._strain(self._deformation(state.u)) * self._dV))
 
-    def force(self, state: State, out: Floats) -> None:
-        """Add the fibres' forces, N."""
-        F = self._deformation(state.u)
-        _, first, _ = self._law(self._strain(F))
-        stress = (2.0 * first * self._dV)[:, :, None, None] * (F @ self._H)
+    def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
+        """Add the forces of a given fibre stress, N."""
+        stress = (lagged * self._dV)[:, :, None, None] * (self._deformation(u) @ self._H)
         add_at_nodes(self.nodes, np.einsum("eqij,eqja->eai", stress, self._G, optimize=True), out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
@@ -181,13 +179,15 @@ class SpreadFibres:
         del loads
         return self.stress(u)
 
-    def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the fibre stress that the step `du` predicts, linearised at the state, ``(m, q)``, MPa."""
+    def lagged_change(self, state: State, du: Floats) -> Floats:
+        """Return the change of the fibre stress along the step `du`, linearised at the state, ``(m, q)``, MPa."""
         F = self._deformation(state.u)
-        _, first, second = self._law(self._strain(F))
-        change = 2.0 * np.einsum("eqij,eqij->eq", F @ self._H, self._gradient(du))
-        stress = 2.0 * (first + second * change)
-        return np.asarray(np.maximum(stress, 0.0) if self.family.tension_only else stress)
+        _, _, second = self._law(self._strain(F))
+        return np.asarray(4.0 * second * np.einsum("eqij,eqij->eq", F @ self._H, self._gradient(du)))
+
+    def allowed(self, lagged: Floats) -> Floats:
+        """Return the stress without what fibres that go slack cannot bear."""
+        return np.maximum(lagged, 0.0) if self.family.tension_only else lagged
 
     def _gradient(self, field: Floats) -> Floats:
         """Return the gradient ∂field_i/∂X_j of a nodal field at the quadrature points, ``(m, q, 3, 3)``."""

@@ -14,7 +14,7 @@ from turgor.common.errors import InputError
 from turgor.fem.kernels import parallel
 from turgor.fem.locate import locate
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes
+from turgor.fem.term import Mixed, add_at_nodes
 from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Fibre:
         return 0.25 * np.pi * self.youngs_modulus * self.diameter**2
 
 
-class EmbeddedFibre:
+class EmbeddedFibre(Mixed):
     """½ E A Σ ε² L over straight bars, ε = l/L − 1, whose ends move with the cells that they lie in.
 
     The ends' displacement is interpolated by the shape functions of their host cells (Phillips and Zienkiewicz 1976;
@@ -96,7 +96,7 @@ class EmbeddedFibre:
     def tension(self, u: Floats) -> Floats:
         """Return the axial force of every bar at displacement `u`, ``(n_bars,)``, N."""
         force = self.fibre.axial_stiffness * self.strain(u)
-        return np.maximum(force, 0.0) if self.fibre.tension_only else force
+        return self.allowed(force)
 
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""
@@ -107,10 +107,10 @@ class EmbeddedFibre:
         _, length = self._direction(state.u)
         return float(np.vdot(lagged, length - self.length))
 
-    def force(self, state: State, out: Floats) -> None:
-        """Add the bars' forces, N."""
-        direction, _ = self._direction(state.u)
-        pull = self.tension(state.u)[:, None] * direction
+    def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
+        """Add the forces of bars with given axial forces, N."""
+        direction, _ = self._direction(u)
+        pull = lagged[:, None] * direction
         add_at_nodes(self.nodes, self._share[:, :, None] * pull[:, None, :], out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
@@ -123,12 +123,14 @@ class EmbeddedFibre:
         del loads
         return self.tension(u)
 
-    def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the axial forces that the step `du` predicts, linearised at the state, ``(n_bars,)``, N."""
+    def lagged_change(self, state: State, du: Floats) -> Floats:
+        """Return the change of the axial forces along the step `du`, linearised at the state, ``(n_bars,)``, N."""
         direction, _ = self._direction(state.u)
-        change = np.einsum("bi,bi->b", direction, self._difference(du))
-        force = self.tension(state.u) + self._axial(state.u) * change
-        return np.asarray(np.maximum(force, 0.0) if self.fibre.tension_only else force)
+        return np.asarray(self._axial(state.u) * np.einsum("bi,bi->b", direction, self._difference(du)))
+
+    def allowed(self, lagged: Floats) -> Floats:
+        """Return the axial forces without those that a thread cannot bear."""
+        return np.maximum(lagged, 0.0) if self.fibre.tension_only else lagged
 
     def _difference(self, field: Floats) -> Floats:
         """Return the difference of a nodal field between the two ends of every bar, ``(n_bars, 3)``."""

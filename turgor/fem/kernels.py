@@ -132,11 +132,11 @@ def deformation(u, cells, G, dV, modes, F, J, dilatation):  # type: ignore[no-un
 
 
 @parallel
-def linear_changes(du, cells, F, G, dV, modes, tau, tangent, dilatation, stress):  # type: ignore[no-untyped-def]
-    """Add to ``dilatation (m, k)`` its change along `du` ``(n_points, d)``; fill ``stress (m, q, 6)``, changed too.
+def linear_changes(du, cells, F, G, dV, modes, tangent, dilatation, stress):  # type: ignore[no-untyped-def]
+    """Fill ``dilatation (m, k)`` and ``stress (m, q, 6)`` with their changes along `du` ``(n_points, d)``.
 
-    The stress is the second Piola–Kirchhoff stress that belongs to the Kirchhoff stress ``tau (m, q, 6)``, and changes
-    with the Green–Lagrange strain: ``S = F⁻¹ (τ + c : sym(∇du)) F⁻ᵀ``, c the spatial ``tangent (m, q, 21)``.
+    The second Piola–Kirchhoff stress changes with the Green–Lagrange strain: ``F⁻¹ (c : sym(∇du)) F⁻ᵀ``, c the spatial
+    ``tangent (m, q, 21)``.
     """
     for chunk in nb.prange(CHUNKS):
         local = np.empty((du.shape[1], cells.shape[1]))
@@ -146,6 +146,7 @@ def linear_changes(du, cells, F, G, dV, modes, tau, tangent, dilatation, stress)
         strain = np.empty(6)
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
             gather(du, cells[e], local)
+            dilatation[e] = 0.0
             volume = 0.0
             for q in range(G.shape[1]):
                 volume += dV[e, q]
@@ -162,12 +163,26 @@ def linear_changes(du, cells, F, G, dV, modes, tau, tangent, dilatation, stress)
                     dilatation[e, k] += modes[e, q, k] * weight * (strain[0] + strain[1] + strain[2])
                 for i in range(3):
                     for j in range(i, 3):
-                        value = tau[e, q, SYM[i, j]]
+                        value = 0.0
                         for r in range(6):
                             value += tangent[e, q, PACK[SYM[i, j], r]] * strain[r]
                         spatial[i, j] = value
                         spatial[j, i] = value
                 sandwich(inv, spatial, stress[e, q])
+
+
+@parallel
+def pulled_back(F, tau, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (m, q, 6)`` with the second Piola–Kirchhoff stress ``F⁻¹ τ F⁻ᵀ``, ``F (m, q, 3, 3)``."""
+    for e in nb.prange(len(F)):
+        full = np.empty((3, 3))
+        inv = np.empty((3, 3))
+        for q in range(F.shape[1]):
+            inverse(F[e, q], inv)
+            for i in range(3):
+                for j in range(3):
+                    full[i, j] = tau[e, q, SYM[i, j]]
+            sandwich(inv, full, out[e, q])
 
 
 @parallel

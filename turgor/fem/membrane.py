@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes, pack_symmetric
+from turgor.fem.term import Mixed, add_at_nodes, pack_symmetric
 from turgor.mesh.cells import Cell, body_cell
 from turgor.mesh.faces import all_faces, shared_faces
 from turgor.mesh.mesh import Mesh
@@ -45,7 +45,7 @@ class Membrane:
         return self.surface if isinstance(self.surface, str) else "/".join(self.surface)
 
 
-class BondedMembrane:
+class BondedMembrane(Mixed):
     """½ ∫ S : E dA over second-order faces, E the Green–Lagrange strain in their plane, S = D : E.
 
     D is Hooke's law in plane stress times the thickness (the membrane of St. Venant and Kirchhoff: a sheet that
@@ -96,11 +96,10 @@ class BondedMembrane:
         stress = lagged.reshape(*self.dA.shape, 3)
         return float(np.einsum("fqr,fqr,fq->", stress, self.strain(state.u), self.dA))
 
-    def force(self, state: State, out: Floats) -> None:
-        """Add the membrane's forces, N."""
-        tangents = self._tangents(state.u)
-        stress = self._strain(tangents) @ self._law
-        operator = self._strain_operator(tangents)
+    def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
+        """Add the forces of given stress resultants, N."""
+        stress = lagged.reshape(*self.dA.shape, 3)
+        operator = self._strain_operator(self._tangents(u))
         force = np.einsum("fqraj,fqr,fq->faj", operator, stress, self.dA, optimize=True)
         add_at_nodes(self.nodes, force, out)
 
@@ -120,11 +119,10 @@ class BondedMembrane:
         del loads
         return self.stress(u).ravel()
 
-    def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the stress resultants that the step `du` predicts, linearised at the state, flat, N/mm."""
-        tangents = self._tangents(state.u)
-        change = np.einsum("fqraj,faj->fqr", self._strain_operator(tangents), du[self.nodes], optimize=True)
-        return np.asarray((self._strain(tangents) + change) @ self._law).ravel()
+    def lagged_change(self, state: State, du: Floats) -> Floats:
+        """Return the change of the stress resultants along the step `du`, linearised at the state, flat, N/mm."""
+        operator = self._strain_operator(self._tangents(state.u))
+        return np.asarray(np.einsum("fqraj,faj->fqr", operator, du[self.nodes], optimize=True) @ self._law).ravel()
 
     def _tangents(self, u: Floats) -> Floats:
         """Return the deformed images of the two unit directions, ``(k, q, 2, 3)``."""

@@ -31,14 +31,14 @@ class Sheet(Solid):
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F in the plane over the quadrature points and the mesh cell where it is."""
         super()._find_deformation(u)
-        self._deformed_by = None  # the thickness has not followed
-        at = int(np.argmin(self._J.min(axis=1)))
-        return float(self._J[at].min()), int(self.index[at])
+        self._now.forget()  # the thickness has not followed
+        at = int(np.argmin(self._now.J.min(axis=1)))
+        return float(self._now.J[at].min()), int(self.index[at])
 
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""
         self._deform(state.u)
-        density = self._law()[0].reshape(self.dV.shape) + self.material.volumetric.energy(self._J)
+        density = self._law()[0].reshape(self.dV.shape) + self.material.volumetric.energy(self._now.J)
         return float(np.sum(density * self.dV))
 
     def merit(self, state: State, lagged: Floats) -> float:
@@ -50,14 +50,14 @@ class Sheet(Solid):
         """Return each element's ratio of volumes, ``(m,)``."""
         del lagged
         self._deform(state.u)
-        ratio: Floats = np.einsum("mq,mq->m", self._J, self.dV) / self.volume
+        ratio: Floats = np.einsum("mq,mq->m", self._now.J, self.dV) / self.volume
         return ratio
 
     def mean_pressure(self, state: State, lagged: Floats) -> Floats:
         """Return the mean of U'(J) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
         del lagged
         self._deform(state.u)
-        mean: Floats = np.einsum("mq,mq->m", self.material.volumetric.pressure(self._J), self.dV) / self.volume
+        mean: Floats = np.einsum("mq,mq->m", self.material.volumetric.pressure(self._now.J), self.dV) / self.volume
         return mean
 
     def _modes(self, nodes: Floats) -> Floats:
@@ -72,43 +72,43 @@ class Sheet(Solid):
 
     def _find_deformation(self, u: Floats) -> None:
         super()._find_deformation(u)
-        area_ratio = self._J.copy()
-        self._J[:] = 1.0
+        area_ratio = self._now.J.copy()
+        self._now.J[:] = 1.0
         for _ in range(MOST_STEPS):
-            self._F[:, :, 2, 2] = self._J / area_ratio
+            self._now.F[:, :, 2, 2] = self._now.J / area_ratio
             stress, stiffness = self._across()
             change = np.clip(-stress / stiffness, -LARGEST_STEP, LARGEST_STEP)
-            self._J *= np.exp(change)
+            self._now.J *= np.exp(change)
             if np.abs(change).max() <= CONVERGED:
                 break
         else:
-            self._J[:] = np.nan
-        self._F[:, :, 2, 2] = self._J / area_ratio
+            self._now.J[:] = np.nan
+        self._now.F[:, :, 2, 2] = self._now.J / area_ratio
 
     def _across(self) -> tuple[Floats, Floats]:
         """Return the first and second derivative of the energy by ln λ₃, each ``(m, q)``, MPa."""
         self._respond_fully()
-        stress = self._tau[:, :, ACROSS]
-        curvature = self._tangent[:, :, PACK[ACROSS, ACROSS]] + 2.0 * stress
+        stress = self._now.tau[:, :, ACROSS]
+        curvature = self._now.tangent[:, :, PACK[ACROSS, ACROSS]] + 2.0 * stress
         # Where the energy is not convex yet, go downhill by the bulk modulus.
         return stress, np.where(curvature > 0.0, curvature, self.material.bulk_modulus)
 
     def _respond_fully(self) -> None:
         """Add the volumetric part to Kirchhoff stress and tangent: J U' 1 and (J² U'' + J U') 1⊗1 − 2 J U' I."""
         super()._find_response()
-        pressure = self._J * self.material.volumetric.pressure(self._J)
-        growth = self._J**2 * self.material.volumetric.stiffness(self._J) + pressure
+        pressure = self._now.J * self.material.volumetric.pressure(self._now.J)
+        growth = self._now.J**2 * self.material.volumetric.stiffness(self._now.J) + pressure
         for r in range(6):
             if r < 3:
-                self._tau[:, :, r] += pressure
+                self._now.tau[:, :, r] += pressure
                 for s in range(r, 3):
-                    self._tangent[:, :, PACK[r, s]] += growth
-            self._tangent[:, :, PACK[r, r]] -= (2.0 if r < 3 else 1.0) * pressure
+                    self._now.tangent[:, :, PACK[r, s]] += growth
+            self._now.tangent[:, :, PACK[r, r]] -= (2.0 if r < 3 else 1.0) * pressure
 
     def _find_response(self) -> None:
         """Kirchhoff stress and tangent in the plane, the stretch across it eliminated."""
         self._respond_fully()
-        tangent = self._tangent.reshape(-1, TANGENT_SIZE)
+        tangent = self._now.tangent.reshape(-1, TANGENT_SIZE)
         across = tangent[:, PACK[ACROSS, ACROSS]]
         for r in IN_PLANE:
             for s in IN_PLANE:

@@ -9,7 +9,7 @@ from turgor.fem import constitutive, kernels
 from turgor.fem.elements import pressure_modes, reference_gradients
 from turgor.fem.section import Section
 from turgor.fem.state import State
-from turgor.fem.term import add_at_nodes
+from turgor.fem.term import Mixed, add_at_nodes
 from turgor.materials.hyperelastic import Hyperelastic, InvariantModel, StretchModel
 from turgor.mesh.cells import body_cell
 
@@ -22,7 +22,33 @@ AUGMENTATION = 10.0
 """Shear moduli that stand for the bulk modulus in the merit of a mixed step."""
 
 
-class Solid:
+class _Configuration:
+    """Deformation and response of a region at one displacement: both are asked for again and again.
+
+    ``F (m, q, 3, 3)``, its determinant ``J (m, q)``, the coefficients of θ ``dilatation (m, k)``, isochoric Kirchhoff
+    stress ``tau (m, q, 6)`` and its spatial ``tangent (m, q, 21)``, what lags.
+    """
+
+    def __init__(self, m: int, q: int, k: int) -> None:
+        self.F = np.empty((m, q, 3, 3))
+        self.J = np.empty((m, q))
+        self.dilatation = np.empty((m, k))
+        self.tau = np.empty((m, q, 6))
+        self.tangent = np.empty((m, q, TANGENT_SIZE))
+        self.forget()
+
+    def forget(self) -> None:
+        """Be of no displacement."""
+        self.u: Floats | None = None
+        self.has_responded = False
+        self.lagged: Floats | None = None
+
+    def is_at(self, u: Floats) -> bool:
+        """Whether this is the configuration at `u`."""
+        return self.u is not None and np.array_equal(u, self.u)
+
+
+class Solid(Mixed):
     """∫ W(F̄) + U(θ) dV over one material region, θ the projection of J on the pressure modes of each element.
 
     In tetrahedra and triangles θ is the element's ratio of volumes (Nagtegaal, Parks and Rice 1974), in hexahedra and
@@ -65,17 +91,11 @@ class Solid:
         self.modes = self._modes(points[self.nodes])
         self._share = self.modes * (self.dV / self.volume[:, None])[:, :, None]
         m, q, _, n = self.G.shape
-        self._F = np.empty((m, q, 3, 3))
-        self._J = np.empty((m, q))
-        self._dilatation = np.empty((m, self.modes.shape[2]))
-        self._tau = np.empty((m, q, 6))
-        self._tangent = np.empty((m, q, TANGENT_SIZE))
-        self._lagged_tau = np.empty((m, q, 6))
+        # The one asked for last, and that of the stiffness: iterations go to and fro between the two.
+        self._now, self._other = (_Configuration(m, q, self.modes.shape[2]) for _ in range(2))
+        self._turned = np.empty((m, q, 6))
         self._force = np.empty((m, n, self.cell.dimension))
         self._places = kernels.packing(n, self.cell.dimension)
-        # Force, stiffness and what lags after a step are asked for at one displacement after another.
-        self._deformed_by: Floats | None = None
-        self._has_responded = False
 
     def lagged_at(self, u: Floats, loads: Floats) -> Floats:
         """Return what lags at displacement `u`, ``(m, k + 6 q)``.
@@ -83,34 +103,36 @@ class Solid:
         The coefficients of θ, of which the first is the element's ratio of volumes, then the components of S.
         """
         del loads
-        return self.lagged_after(State(u, (), np.empty(0)), np.zeros_like(u))
+        self._deform(u)
+        self._respond()
+        if self._now.lagged is None:
+            stress = np.empty((*self.dV.shape, 6))
+            kernels.pulled_back(self._now.F, self._now.tau, stress)
+            self._now.lagged = self._joined(self._now.dilatation, stress)
+        return self._now.lagged
 
-    def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return what lags ``(m, k + 6 q)`` as the step `du` ``(n_points, d)`` predicts it, linearised."""
+    def lagged_change(self, state: State, du: Floats) -> Floats:
+        """Return the change ``(m, k + 6 q)`` of what lags along the step `du` ``(n_points, d)``, linearised."""
         self._deform(state.u)
         self._respond()
-        m, q, k = self.modes.shape
-        after = np.empty((m, k + 6 * q))
-        after[:, :k] = self._dilatation
-        stress = np.empty((m, q, 6))
+        dilatation, stress = np.empty_like(self._now.dilatation), np.empty((*self.dV.shape, 6))
         kernels.linear_changes(
-            du, self.nodes, self._F, self.G, self.dV, self.modes, self._tau, self._tangent, after[:, :k], stress
+            du, self.nodes, self._now.F, self.G, self.dV, self.modes, self._now.tangent, dilatation, stress
         )
-        after[:, k:] = stress.reshape(m, 6 * q)
-        return after
+        return self._joined(dilatation, stress)
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F over the quadrature points and the mesh cell where it is."""
         self._deform(u)
-        at = int(np.argmin(self._J.min(axis=1)))
-        return float(self._J[at].min()), int(self.index[at])
+        at = int(np.argmin(self._now.J.min(axis=1)))
+        return float(self._now.J[at].min()), int(self.index[at])
 
     def isochoric_stretches(self, u: Floats) -> Floats:
         """Return the principal stretches of the isochoric deformation at the quadrature points, ``(m, q, 3)``."""
         self._deform(u)
-        stretches, directions = np.empty((self._J.size, 3)), np.empty((self._J.size, 3, 3))
-        constitutive.isochoric_stretches(self._F.reshape(-1, 3, 3), self._J.ravel(), stretches, directions)
-        return stretches.reshape(*self._J.shape, 3)
+        stretches, directions = np.empty((self._now.J.size, 3)), np.empty((self._now.J.size, 3, 3))
+        constitutive.isochoric_stretches(self._now.F.reshape(-1, 3, 3), self._now.J.ravel(), stretches, directions)
+        return stretches.reshape(*self._now.J.shape, 3)
 
     def rounding(self, u: Floats) -> float:
         """Return the size of the forces, N, that rounding alone causes at displacement `u`.
@@ -125,7 +147,7 @@ class Solid:
         """Return the strain energy, N mm."""
         self._deform(state.u)
         density = self._law()[0].reshape(self.dV.shape)
-        volumetric = self.material.volumetric.energy(self._at_points(self._dilatation))
+        volumetric = self.material.volumetric.energy(self._at_points(self._now.dilatation))
         return float(np.sum((density + volumetric) * self.dV))
 
     def merit(self, state: State, lagged: Floats) -> float:
@@ -136,7 +158,7 @@ class Solid:
         self._deform(state.u)
         density = self._law()[0].reshape(self.dV.shape)
         law, expected = self.material.volumetric, self._at_points(self._lagged_dilatation(lagged))
-        deviation = self._at_points(self._dilatation) - expected
+        deviation = self._at_points(self._now.dilatation) - expected
         bulk = AUGMENTATION * self.material.shear_modulus
         volumetric = law.energy(expected) + law.pressure(expected) * deviation + 0.5 * bulk * deviation**2
         return float(np.sum((density + volumetric) * self.dV))
@@ -145,22 +167,34 @@ class Solid:
         """Add the internal forces, N."""
         self._deform(state.u)
         self._respond()
-        pressure = self._pressure(self._dilatation)
-        kernels.element_forces(self._F, self.G, self.dV, self._tau, pressure, self._force)
+        pressure = self._pressure(self._now.dilatation)
+        kernels.element_forces(self._now.F, self.G, self.dV, self._now.tau, pressure, self._force)
         add_at_nodes(self.nodes, self._force, out)
+
+    def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
+        """Add the internal forces of given dilatations and stresses, N."""
+        self._add_forces(u, self._lagged_stress(lagged), self._pressure(self._lagged_dilatation(lagged)), out)
+
+    def mixed_force(self, state: State, lagged: Floats, base: State, kept: Floats, out: Floats) -> None:
+        """Add the force out of balance of the mixed problem with the stiffness of `base`, N."""
+        self.force_of(state.u, lagged, out)
+        missing = self.lagged_at(state.u, state.loads) - lagged
+        modes = self._bulk(self._lagged_dilatation(kept)) @ self._lagged_dilatation(missing)[:, :, None]
+        pressure = self._at_points(modes[:, :, 0] * self.volume[:, None])
+        self._add_forces(base.u, self._lagged_stress(missing), pressure, out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the element stiffnesses, the pressure condensed."""
         self._deform(state.u)
         self._respond()
         dilatation = self._lagged_dilatation(lagged)
-        kernels.transformed(self._F, self._lagged_stress(lagged), self._lagged_tau)
+        kernels.transformed(self._now.F, self._lagged_stress(lagged), self._turned)
         kernels.element_stiffness(
-            self._F,
+            self._now.F,
             self.G,
             self.dV,
-            self._lagged_tau,
-            self._tangent,
+            self._turned,
+            self._now.tangent,
             self._pressure(dilatation),
             self.modes,
             self._bulk(dilatation),
@@ -185,9 +219,20 @@ class Solid:
         """Return the Cauchy stress at the quadrature points in the stored symmetric order, ``(m, q, 6)``, MPa."""
         self._deform(state.u)
         self._respond()
-        stress = self._tau / self._J[:, :, None]
-        stress[:, :, :3] += self._pressure(self._dilatation)[:, :, None]
+        stress = self._now.tau / self._now.J[:, :, None]
+        stress[:, :, :3] += self._pressure(self._now.dilatation)[:, :, None]
         return np.asarray(stress)
+
+    def _add_forces(self, u: Floats, stress: Floats, pressure: Floats, out: Floats) -> None:
+        """Add the internal forces at displacement `u` of S ``(m, q, 6)`` and a pressure ``(m, q)``."""
+        self._deform(u)
+        kernels.transformed(self._now.F, stress, self._turned)
+        kernels.element_forces(self._now.F, self.G, self.dV, self._turned, pressure, self._force)
+        add_at_nodes(self.nodes, self._force, out)
+
+    @staticmethod
+    def _joined(dilatation: Floats, stress: Floats) -> Floats:
+        return np.concatenate([dilatation, stress.reshape(len(stress), -1)], axis=1)
 
     def _lagged_dilatation(self, lagged: Floats) -> Floats:
         return lagged[:, : self.modes.shape[2]]
@@ -215,22 +260,25 @@ class Solid:
 
     def _deform(self, u: Floats) -> None:
         """Bring deformation gradients and dilatations to a displacement, unless they are there."""
-        if self._deformed_by is None or not np.array_equal(u, self._deformed_by):
-            self._deformed_by, self._has_responded = u.copy(), False
+        if not self._now.is_at(u):
+            self._now, self._other = self._other, self._now
+        if not self._now.is_at(u):
+            self._now.forget()
             self._find_deformation(u)
+            self._now.u = u.copy()
 
     def _respond(self) -> None:
         """Bring isochoric Kirchhoff stress and tangent to the deformation, unless they are there."""
-        if not self._has_responded:
+        if not self._now.has_responded:
             self._find_response()
-            self._has_responded = True
+            self._now.has_responded = True
 
     def _find_deformation(self, u: Floats) -> None:
-        kernels.deformation(u, self.nodes, self.G, self.dV, self.modes, self._F, self._J, self._dilatation)
+        kernels.deformation(u, self.nodes, self.G, self.dV, self.modes, self._now.F, self._now.J, self._now.dilatation)
 
     def _law(self) -> tuple[Floats, ...]:
         # Evaluate the material; for a law in stretches, the principal directions come last.
-        F, J = self._F.reshape(-1, 3, 3), self._J.ravel()
+        F, J = self._now.F.reshape(-1, 3, 3), self._now.J.ravel()
         if isinstance(self.material, InvariantModel):
             I1, I2 = np.empty_like(J), np.empty_like(J)
             constitutive.isochoric_invariants(F, J, I1, I2)
@@ -241,8 +289,8 @@ class Solid:
         return *self.material.derivatives(stretches), stretches, directions
 
     def _find_response(self) -> None:
-        F, J = self._F.reshape(-1, 3, 3), self._J.ravel()
-        tau, tangent = self._tau.reshape(-1, 6), self._tangent.reshape(-1, TANGENT_SIZE)
+        F, J = self._now.F.reshape(-1, 3, 3), self._now.J.ravel()
+        tau, tangent = self._now.tau.reshape(-1, 6), self._now.tangent.reshape(-1, TANGENT_SIZE)
         if isinstance(self.material, InvariantModel):
             _, *derivatives = self._law()
             constitutive.invariant_response(F, J, *derivatives, tau, tangent)

@@ -28,7 +28,7 @@ from turgor.fem.sheet import Sheet
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
-from turgor.fem.term import Loaded, Term
+from turgor.fem.term import Loaded, Mixed, Term
 from turgor.fem.threads import prefer_light_threads
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
@@ -262,10 +262,26 @@ class System:
             contact.force(state, total)
         return float(np.linalg.norm(total))
 
-    def advanced(self, state: State, du: Floats) -> State:
-        """Return the state after Newton's step `du`, what lags updated as the step predicts."""
-        lagged = tuple(term.lagged_after(state, du) for term in self.terms)
+    def advanced(self, state: State, du: Floats, base: State | None = None) -> State:
+        """Return the state after the step `du`, what lags updated with the slopes of `base` or its own."""
+        lagged = tuple(
+            term.lagged_after(state, du, base) if isinstance(term, Mixed) else term.lagged_after(state, du)
+            for term in self.terms
+        )
         return replace(state, u=state.u + du, lagged=lagged)
+
+    def mixed_force(self, state: State, base: State) -> Floats:
+        """Return the force out of balance ``(n_points, d)``, N, of the mixed problem with the stiffness of `base`.
+
+        With the stiffness of the state itself it is the force (:class:`turgor.fem.term.Mixed`).
+        """
+        total = np.zeros_like(state.u)
+        for term, lagged, kept in zip(self.terms, state.lagged, base.lagged, strict=True):
+            if isinstance(term, Mixed):
+                term.mixed_force(state, lagged, base, kept, total)
+            else:
+                term.force(state, total)
+        return total
 
     def merit(self, state: State, lagged: tuple[Floats, ...]) -> float:
         """Return the energy that a line search goes by, N mm; `lagged` are the values that a full step predicts."""

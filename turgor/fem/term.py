@@ -81,6 +81,48 @@ class Unlagged(ABC):
         return self.energy(state)
 
 
+class Mixed(ABC):
+    """A term whose force is linear in what lags, the stresses: ``Bᵀ(u) s``.
+
+    With the stiffness of an earlier state, the mixed problem can then be solved again: eliminating the change of the
+    stresses leaves ``Bᵀ(u) s + B₀ᵀ (ŝ(u) − s)`` as the force out of balance, ŝ the stresses that belong to u and
+    B₀ those directions that the stiffness was made with. With the stiffness of the state itself that is the force.
+    """
+
+    @abstractmethod
+    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
+        """Return the lagged quantities that belong to the displacement `u` under the loads."""
+
+    @abstractmethod
+    def lagged_change(self, state: State, du: Floats) -> Floats:
+        """Return the change of the lagged quantities along `du`, linearised at the state."""
+
+    @abstractmethod
+    def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
+        """Add the force of given lagged quantities at displacement `u`, N."""
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the force, N."""
+        self.force_of(state.u, self.lagged_at(state.u, state.loads), out)
+
+    def lagged_after(self, state: State, du: Floats, base: State | None = None) -> Floats:
+        """Return the lagged quantities after the step `du`, linearised at the state, or with the slopes of `base`."""
+        return self.allowed(self.lagged_at(state.u, state.loads) + self.lagged_change(base or state, du))
+
+    def allowed(self, lagged: Floats) -> Floats:
+        """Return the lagged quantities as far as the term can bear them."""
+        return lagged
+
+    def mixed_force(self, state: State, lagged: Floats, base: State, kept: Floats, out: Floats) -> None:
+        """Add the force out of balance of the mixed problem with the stiffness of `base`, N.
+
+        `lagged` and `kept` are the term's lagged quantities in the two states.
+        """
+        del kept
+        self.force_of(state.u, lagged, out)
+        self.force_of(base.u, self.lagged_at(state.u, state.loads) - lagged, out)
+
+
 class Loaded(Protocol):
     """A term whose size follows a load: ``channel`` is its place in ``State.loads``."""
 

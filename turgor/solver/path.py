@@ -18,10 +18,11 @@ from turgor.solver.control import Volume
 from turgor.solver.events import Event
 from turgor.solver.limits import after_snap
 from turgor.solver.linear import LinearSolver, make_linear_solver
-from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
+from turgor.solver.tangent import factorise_tangent
 from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, softest_mode
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
@@ -30,8 +31,8 @@ log = logger("solver")
 
 CUT = 0.4
 GROWTH = 1.6
-EASY = 7
-"""A step that took no more iterations than this lets the next one grow."""
+EASY = 5
+"""A step that took no more factorisations than this lets the next one grow."""
 
 FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
@@ -220,7 +221,7 @@ class _Walk:
         if self._may_have_jumped(found):
             log.info("step to %.4g may have passed over a limit", aim)
             return self._failed(size, target, NotConvergedError("the path has a jump"))
-        if found.iterations <= EASY:
+        if found.factorisations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
         return self._bifurcated(found) if found.stable is False and self.here.stable is not False else found
 

@@ -17,8 +17,9 @@ from turgor.fem.system import System
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.linear import LinearSolver
-from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, factorise_tangent, find_equilibrium
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
+from turgor.solver.tangent import factorise_tangent
 
 log = logger("solver")
 
@@ -28,7 +29,7 @@ SLACK = 0.2
 """A step that would leave less than this part of itself to a limit goes there."""
 
 EASY = 5
-"""A step that took no more iterations than this lets the next one grow."""
+"""A step that took no more factorisations than this lets the next one grow."""
 
 INVERSE_ITERATIONS = 12
 
@@ -114,7 +115,7 @@ class VolumeWalk:
                 self.failure = error
                 self.step = 0.4 * (aim - now)
                 continue
-            if found.iterations <= EASY:
+            if found.factorisations <= EASY:
                 self.step = max(self.step, 1.4 * (aim - now), key=abs)
             self._earlier, self.before, self.here = self.before, self.here, found
             return found
