@@ -106,6 +106,30 @@ def test_beyond_the_limit_pressure_the_walk_ends_at_the_limit():
     assert np.abs(radial).min() > 0.9 * np.abs(radial).max()
 
 
+def test_a_limit_is_located_though_states_between_its_ends_are_hard_to_find(monkeypatch):
+    system = sphere(0.01, n=2)
+    linear = make_linear_solver(system.pattern.row_start, system.pattern.column)
+    start = solve_path(system, [1.0])[0]
+    walk = VolumeWalk(system, linear, start, 0.5 * system.conjugate(system.reference_state()), NewtonOptions())
+    ends = [walk.here]
+    while ends[-1].rising:
+        ends.append(walk.advance())
+    found, reach = walk.at, walk.measure(ends[-2]) + 0.05 * (walk.measure(ends[-1]) - walk.measure(ends[-2]))
+    refused = []
+
+    def at_hand(value):
+        if value > reach and len(refused) < 3:
+            refused.append(value)
+            raise NotConvergedError("out of reach")
+        return found(value)
+
+    monkeypatch.setattr(walk, "at", at_hand)
+    limit = walk.limit_between(*ends[-2:])
+    assert len(refused) == 3
+    # p/μ = 0.4935, as in the test above
+    assert 0.01 * limit.equilibrium.fraction / 0.1 == pytest.approx(0.4935, rel=5e-3)
+
+
 def test_volume_control_goes_on_behind_the_limit():
     system = sphere(0.01, n=2)
     linear = make_linear_solver(system.pattern.row_start, system.pattern.column)

@@ -31,6 +31,10 @@ SLACK = 0.2
 EASY = 5
 """A step that took no more factorisations than this lets the next one grow."""
 
+NEARER = 0.3
+NEAREST = 0.01
+"""Where no equilibrium is found between the ends of a limit, it is sought so much nearer to the first, so far."""
+
 INVERSE_ITERATIONS = 12
 
 SMALLEST_PART = 1e-3
@@ -166,16 +170,22 @@ class VolumeWalk:
         span = ends[1][0] - ends[0][0]
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1]))[2]
         third = self._earlier
+        nearer = 1.0
         for _ in range(30):
             (q0, s0, e0), (q1, s1, e1) = ends
             self.stand_at(e1, e0, third)
-            aim = q0 + min(max(s0 / (s0 - s1), 0.05), 0.95) * (q1 - q0)
+            aim = q0 + nearer * min(max(s0 / (s0 - s1), 0.05), 0.95) * (q1 - q0)
             try:
                 best = self.at(aim)
             except NotConvergedError as error:
-                self.stand_at(second, first)
-                reason = f"the load has a limit near {best.fraction:.4g} of the target, not located: {error.reason}"
-                raise NotConvergedError(reason, facts=error.facts) from error
+                # Two ends far apart say little of what lies between; nearer to the first one it is easier.
+                nearer *= NEARER
+                if nearer < NEAREST:
+                    self.stand_at(second, first)
+                    reason = f"the load has a limit near {best.fraction:.4g} of the target, not located: {error.reason}"
+                    raise NotConvergedError(reason, facts=error.facts) from error
+                continue
+            nearer = 1.0
             slope = 1.0 / _compliance(best)
             dropped = 0 if slope * s0 > 0 else 1
             third = ends[dropped][2]
