@@ -227,6 +227,12 @@ def test_a_section_of_zeros_is_told_in_words() -> None:
     assert not all_zero(history, axes)
 
 
+def test_of_many_lines_those_that_end_highest_are_drawn() -> None:
+    row = {f"fibre_fibre-{k}_largest_strain": 0.01 * k for k in range(1, 13)}
+    (lines,) = groups([row])["Fibres"].values()
+    assert [name for _, name in lines] == [f"fibre-{k}" for k in range(5, 13)]
+
+
 def test_diagrams_leave_room_for_titles_and_legends_between_them() -> None:
     for rows in (2, 3):
         figure = plots.panels(rows, plots.HEIGHT)

@@ -25,18 +25,22 @@ _KINDS = (
 )
 """Section of the report, how the keys of its columns begin and end, and the axis that they share."""
 
-_MOST_LINES = 8
+MOST_LINES = 8
 
 
 def groups(history: Sequence[Row]) -> dict[str, dict[str, list[tuple[str, str]]]]:
-    """Return the columns that have a figure: section → axis title → (key, name of the line)."""
+    """Return the columns that have a figure: section → axis title → (key, name of the line).
+
+    Of many lines with one axis those that end highest.
+    """
     found: dict[str, dict[str, list[tuple[str, str]]]] = {}
     columns = history[-1]
     for section, begin, end, title in _KINDS:
         keys = [key for key in columns if key.startswith(begin) and key.endswith(end)]
         lines = [(key, key.removeprefix(begin).removesuffix(end).strip("_") or "all") for key in keys]
         if lines:
-            found.setdefault(section, {})[title] = lines[:_MOST_LINES]
+            highest = sorted(lines, key=lambda line: -abs(columns[line[0]] or 0.0))[:MOST_LINES]
+            found.setdefault(section, {})[title] = [line for line in lines if line in highest]
     return found
 
 
@@ -85,7 +89,7 @@ def over_displacement(history: Sequence[Row]) -> go.Figure | None:
     if not names:
         return None
     figure = go.Figure()
-    for name, color in zip(names[:_MOST_LINES], itertools.cycle(SERIES)):
+    for name, color in zip(names[:MOST_LINES], itertools.cycle(SERIES)):
         # The row of rest knows nothing of contact: nothing has moved there.
         moved, force = ([entry.get(name + end, 0.0) for entry in history] for end in ends)
         symbols = ["circle-open" if entry.get("stable") is False else "circle" for entry in history]

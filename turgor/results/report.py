@@ -163,12 +163,14 @@ def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, An
     """
     groups = curve_plots.groups(history)
     quiet = [title for title, axes in groups.items() if curve_plots.all_zero(history, axes)]
+    most = {title: max(map(len, axes.values())) for title, axes in groups.items()}
+    most = {title: lines for title, lines in most.items() if lines == curve_plots.MOST_LINES}
     figures = [(title, curve_plots.over_load(history, axes)) for title, axes in groups.items() if title not in quiet]
     dynamometers = curve_plots.over_displacement(history)
     figures += [] if dynamometers is None else [("Force over displacement", dynamometers)]
     figures += [(title.replace("-", " ").capitalize(), curve_plots.line(rows)) for title, rows in store.curves.items()]
     return [{"title": title, "zero": [axis.split(" / ")[0].lower() for axis in groups[title]]} for title in quiet] + [
-        {"id": f"extra-{number}", "title": title, "figure": _as_json(figure)}
+        {"id": f"extra-{number}", "title": title, "figure": _as_json(figure), "most": most.get(title)}
         for number, (title, figure) in enumerate(figures)
     ]
 
