@@ -97,6 +97,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "negative-friction.yaml": ("contact.friction", "-0.3", "greater than or equal to 0"),
     "pair-of-one.yaml": ("contact.pairs.0.1", "missing"),
     "plane-without-normal.yaml": ("contact.bodies.0.normal", "length 0"),
+    "linear-path-unknown.yaml": ("solver.linear", "'krylov'", "'iterative'"),
     "poisson-0.6.yaml": ("materials.body.poisson", "0.6", "below 0.5"),
     "pressure-of-1e9.yaml": ("loads.0.value", "times the shear modulus", "check both units"),
     "python-tag.yaml": ("line 4", "python/object/apply:os.system", "not allowed"),

@@ -360,3 +360,16 @@ def element_stiffness(F, G, dV, tau, tangent, pressure, modes, bulk, d, places, 
             flat = K.ravel()
             for at in range(len(places)):
                 packed[e, at] = flat[places[at]]
+
+
+@parallel
+def volume_gradients(F, G, dV, modes, gradient):  # type: ignore[no-untyped-def]
+    """Fill ``gradient (m, k, d, n)`` with ``b_k = ∫ ψ_k ∂J/∂u dV`` of every element."""
+    for chunk in nb.prange(CHUNKS):
+        inv = np.empty((3, 3))
+        g = np.empty((3, G.shape[3]))
+        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
+            gradient[e] = 0.0
+            for q in range(G.shape[1]):
+                J = spatial_gradients(F[e, q], G[e, q], inv, g)
+                add_volume_gradients(J * dV[e, q], g, modes[e, q], gradient[e])

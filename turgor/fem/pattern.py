@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Longs = NDArray[np.int64]
 
 
 def packed_size(n_dofs: int) -> int:
@@ -97,6 +98,28 @@ class SparsePattern:
         _find_targets(nodes, *self._places, target)
         inside = target >= 0
         out += np.bincount(target[inside], packed[inside], minlength=self.n_stored)
+
+    def graph(self) -> sp.csr_matrix:
+        """Return which nodes are coupled, both ways, ``(n_nodes, n_nodes)``.
+
+        Its values are one more than the places of the blocks among those on and above the diagonal, which
+        :meth:`expand` goes through; negative below it.
+        """
+        node_start, node_column, *_ = self._places
+        names = np.arange(1, len(node_column) + 1)
+        n = len(node_start) - 1
+        upper = sp.csr_matrix((names, node_column, node_start), shape=(n, n))
+        return sp.csr_matrix(upper - sp.triu(upper, 1).T)
+
+    def expand(self, values: Floats, above: Longs, below: Longs, width: Longs, out: Floats) -> None:
+        """Write the stored values as whole scalar rows, those of fixed components as identity.
+
+        The blocks of nodes on and above the diagonal go to the places `above` ``(n_blocks,)`` of `out`, their
+        transposes to `below`, in the rows of the later node: from there on, the scalar rows of each node, of `width`
+        entries ``(n_nodes,)``, lie one behind the other.
+        """
+        node_start, node_column, dof_start, dimension, place = self._places
+        _expand(values, above, below, width, node_start, node_column, dof_start, dimension, place, out)
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
@@ -216,3 +239,16 @@ def _gather(packed, source_start, source, out):  # type: ignore[no-untyped-def]
             for m in range(source_start[k], source_start[k + 1]):
                 total += packed[source[m]]
             out[k] = total
+
+
+@nb.njit(cache=True, parallel=True)
+def _expand(values, above, below, width, node_start, node_column, dof_start, d, place, out):  # type: ignore[no-untyped-def]
+    for a in nb.prange(len(width)):
+        for m in range(node_start[a], node_start[a + 1]):
+            rank, b = m - node_start[a], node_column[m]
+            for i in range(d):
+                for k in range(i if rank == 0 else 0, d):
+                    entry = place[dof_start[a * d + i] + d * rank - i + k]
+                    value = values[entry] if entry >= 0 else 1.0 * (rank == 0 and i == k)
+                    out[above[m] + i * width[a] + k] = value
+                    out[below[m] + k * width[b] + i] = value

@@ -10,6 +10,7 @@ from turgor.fem.elements import pressure_modes, reference_gradients
 from turgor.fem.section import Section
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes
+from turgor.fem.volumes import VolumeEquations
 from turgor.materials.hyperelastic import Hyperelastic, InvariantModel, StretchModel
 from turgor.mesh.cells import body_cell
 
@@ -185,22 +186,30 @@ class Solid(Mixed):
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the element stiffnesses, the pressure condensed."""
+        self._fill_stiffness(state, lagged, self._bulk(self._lagged_dilatation(lagged)), out)
+
+    def split_stiffness(self, state: State, lagged: Floats, augmentation: float, out: Floats) -> VolumeEquations:
+        """Fill the element stiffnesses with a part of their bulk modulus; return the rest as equations of their own.
+
+        What stays is at most `augmentation` times the tangent's shear modulus in each element.
+        """
+        dilatation = self._lagged_dilatation(lagged)
+        bulk = self._bulk(dilatation)
         self._deform(state.u)
         self._respond()
-        dilatation = self._lagged_dilatation(lagged)
-        kernels.transformed(self._now.F, self._lagged_stress(lagged), self._turned)
-        kernels.element_stiffness(
-            self._now.F,
-            self.G,
-            self.dV,
-            self._turned,
-            self._now.tangent,
-            self._pressure(dilatation),
-            self.modes,
-            self._bulk(dilatation),
-            self.cell.dimension,
-            self._places,
-            out,
+        modulus = self._tangent_modulus()
+        kept = augmentation * modulus
+        share = kept / (kept + self.volume * bulk[:, 0, 0])
+        self._fill_stiffness(state, lagged, share[:, None, None] * bulk, out)
+        gradient = np.empty((*dilatation.shape, self.cell.dimension, self.G.shape[3]))
+        kernels.volume_gradients(self._now.F, self.G, self.dV, self.modes, gradient)
+        return VolumeEquations(
+            self.nodes,
+            self.volume,
+            gradient,
+            (1.0 - share)[:, None, None] * bulk,
+            (1.0 + augmentation) * modulus,
+            dilatation - self._now.dilatation,
         )
 
     def dilatation(self, state: State, lagged: Floats) -> Floats:
@@ -229,6 +238,31 @@ class Solid(Mixed):
         kernels.transformed(self._now.F, stress, self._turned)
         kernels.element_forces(self._now.F, self.G, self.dV, self._turned, pressure, self._force)
         add_at_nodes(self.nodes, self._force, out)
+
+    def _fill_stiffness(self, state: State, lagged: Floats, bulk: Floats, out: Floats) -> None:
+        """Fill the element stiffnesses with ``bulk (m, k, k)``, that of :meth:`_bulk` or a part of it."""
+        self._deform(state.u)
+        self._respond()
+        kernels.transformed(self._now.F, self._lagged_stress(lagged), self._turned)
+        kernels.element_stiffness(
+            self._now.F,
+            self.G,
+            self.dV,
+            self._turned,
+            self._now.tangent,
+            self._pressure(self._lagged_dilatation(lagged)),
+            self.modes,
+            bulk,
+            self.cell.dimension,
+            self._places,
+            out,
+        )
+
+    def _tangent_modulus(self) -> Floats:
+        """Return a shear modulus of each element's tangent, not below the initial one, ``(m,)``, MPa."""
+        shear = self._now.tangent[:, :, [kernels.PACK[r, r] for r in (3, 4, 5)]].mean(axis=2)
+        mean = np.einsum("mq,mq->m", shear, self.dV) / self.volume
+        return np.asarray(np.maximum(mean, self.material.shear_modulus))
 
     @staticmethod
     def _joined(dilatation: Floats, stress: Floats) -> Floats:

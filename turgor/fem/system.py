@@ -30,6 +30,7 @@ from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
 from turgor.fem.term import Loaded, Mixed, Term
 from turgor.fem.threads import prefer_light_threads
+from turgor.fem.volumes import VolumeEquations
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
 
@@ -198,20 +199,14 @@ class System:
         Where the pattern has no room for what touches now, :attr:`pattern`
         is another one afterwards.
         """
-        for k, term in enumerate(self.terms):
-            block = self._block(k)
-            if block.size:
-                term.stiffness(state, state.lagged[k], block)
-                self._frames.turn(k, block)
-        self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
-        if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
-            self._couplings += [contact.couplings(state.u) for contact in self.contacts]
-            self.pattern = self._make_pattern()
-        values = np.empty(self.pattern.n_stored)
-        self.pattern.sum_blocks(self._packed, values)
-        for nodes, packed in self._touching:
-            self.pattern.add_blocks(nodes, packed, values)
-        return values
+        return self._assembled(state, None)[0]
+
+    def split_stiffness(self, state: State, augmentation: float) -> tuple[Floats, list[VolumeEquations]]:
+        """Return A and the volume equations of the solids, whose pressures are not condensed into it.
+
+        A is :meth:`stiffness` with, in every element, at most `augmentation` shear moduli in place of the bulk modulus.
+        """
+        return self._assembled(state, augmentation)
 
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
@@ -262,12 +257,18 @@ class System:
             contact.force(state, total)
         return float(np.linalg.norm(total))
 
-    def advanced(self, state: State, du: Floats, base: State | None = None) -> State:
-        """Return the state after the step `du`, what lags updated with the slopes of `base` or its own."""
+    def advanced(self, state: State, du: Floats, base: State | None = None, unmet: Sequence[Floats] = ()) -> State:
+        """Return the state after the step `du`, what lags updated with the slopes of `base` or its own.
+
+        `unmet` says for each solid by how much the dilatations that belong to the pressures fall short of those of `du`
+        ``(m, k)``, if the step was not found exactly.
+        """
         lagged = tuple(
             term.lagged_after(state, du, base) if isinstance(term, Mixed) else term.lagged_after(state, du)
             for term in self.terms
         )
+        for values, short in zip(lagged, unmet, strict=False):
+            values[:, : short.shape[1]] -= short
         return replace(state, u=state.u + du, lagged=lagged)
 
     def mixed_force(self, state: State, base: State) -> Floats:
@@ -312,6 +313,27 @@ class System:
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
         """Return the smallest det F over all quadrature points and the cell where it is."""
         return min(solid.worst_jacobian(u) for solid in self.solids)
+
+    def _assembled(self, state: State, augmentation: float | None) -> tuple[Floats, list[VolumeEquations]]:
+        equations = []
+        for k, term in enumerate(self.terms):
+            block = self._block(k)
+            if not block.size:
+                continue
+            if augmentation is not None and isinstance(term, Solid):
+                equations.append(term.split_stiffness(state, state.lagged[k], augmentation, block))
+            else:
+                term.stiffness(state, state.lagged[k], block)
+            self._frames.turn(k, block)
+        self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
+        if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
+            self._couplings += [contact.couplings(state.u) for contact in self.contacts]
+            self.pattern = self._make_pattern()
+        values = np.empty(self.pattern.n_stored)
+        self.pattern.sum_blocks(self._packed, values)
+        for nodes, packed in self._touching:
+            self.pattern.add_blocks(nodes, packed, values)
+        return values, equations
 
     def _block(self, k: int) -> Floats:
         begin, end = self.pattern.packed_offsets[k : k + 2]

@@ -95,6 +95,15 @@ class Cell:
         places: Ints = np.argmax((swapped[:, None, :] == self.nodes).all(axis=2), axis=1).astype(np.int32)
         return places
 
+    @cached_property
+    def corner_shape_at_nodes(self) -> Floats:
+        """Shape functions of the first-order cell of the same corners at all nodes, ``(n_nodes, n_corners)``."""
+        corners, places = self.nodes[: self.n_corners], self.nodes[:, None]
+        if self.simplex:
+            weight = np.concatenate([1.0 - self.nodes.sum(axis=1, keepdims=True), self.nodes], axis=1)
+            return np.asarray(weight @ np.linalg.inv(weight[: self.n_corners]))
+        return np.asarray(np.prod(np.where(corners == 1.0, places, 1.0 - places), axis=2))
+
     def shape(self, points: Floats) -> Floats:
         """Return the shape functions ``(p, n_nodes)`` at reference `points` ``(p, dimension)``."""
         return np.asarray(self._monomials(points) @ self._coefficients)

@@ -12,8 +12,8 @@ import numpy as np
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.system import System
+from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import ArcLength, Quantity, Volume
-from turgor.solver.linear import make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
 from turgor.solver.stops import stopped
@@ -264,7 +264,7 @@ def _walk_from(system: System, quantity: Quantity, options: NewtonOptions, start
         raise InputError("given displacements cannot grow where the load is what it must be", key="control")
     if system.kinks:
         raise InputError("loads with a programme follow time, not a volume", key="control")
-    linear = make_linear_solver(system.pattern.row_start, system.pattern.column)
+    linear = make_stiffness_solver(system, options.linear)
     here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
     try:
         if start is None and system.loaded_at_start:

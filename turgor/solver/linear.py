@@ -10,9 +10,9 @@ import functools
 import importlib.metadata
 import os
 import weakref
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import psutil
@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 from turgor.common.errors import SolverError
 from turgor.common.log import logger
 from turgor.common.optional import is_available, require
+from turgor.fem.state import State
+from turgor.fem.system import System
+from turgor.solver.stiffness import FORCING, Solution, StiffnessSolver
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -34,7 +37,7 @@ class SingularMatrixError(SolverError):
     """The matrix could not be factorised."""
 
 
-class LinearSolver(ABC):
+class LinearSolver(StiffnessSolver):
     """A direct solver for symmetric, possibly indefinite matrices of one fixed pattern.
 
     Parameters
@@ -42,8 +45,6 @@ class LinearSolver(ABC):
     row_start, column
         The upper triangle in compressed rows, zero-based, with every diagonal entry stored.
     """
-
-    name: ClassVar[str]
 
     def __init__(self, row_start: Ints, column: Ints) -> None:
         self.take(row_start, column)
@@ -54,6 +55,18 @@ class LinearSolver(ABC):
         self.column = column
         self.n = len(row_start) - 1
 
+    def take_stiffness(self, system: System, state: State) -> None:
+        """Factorise the stiffness of a state; its pattern is a new one where surfaces have come close to each other."""
+        values = system.stiffness(state)
+        if self.column is not system.pattern.column:
+            self.take(system.pattern.row_start, system.pattern.column)
+        self.factorise(values)
+
+    def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
+        """Return the step for a right-hand side, exact but for rounding."""
+        del accuracy
+        return Solution(system.nodal(self.solve(right)))
+
     @abstractmethod
     def factorise(self, values: Floats) -> None:
         """Factorise the matrix with these stored values.
@@ -63,15 +76,6 @@ class LinearSolver(ABC):
         SingularMatrixError
             If it cannot be done.
         """
-
-    @abstractmethod
-    def solve(self, right: Floats) -> Floats:
-        """Return the solution ``(n,)`` for a right-hand side ``(n,)`` with the newest factors."""
-
-    @property
-    @abstractmethod
-    def negative_pivots(self) -> int | None:
-        """Number of negative eigenvalues of the matrix factorised last, ``None`` where the solver cannot tell."""
 
 
 def make_linear_solver(row_start: Ints, column: Ints) -> LinearSolver:

@@ -12,7 +12,7 @@ from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.control import Control
 from turgor.solver.events import Event
-from turgor.solver.linear import LinearSolver
+from turgor.solver.stiffness import StiffnessSolver
 from turgor.solver.tangent import NewtonOptions, NotConvergedError, Progress, Step, Tangent, failure
 
 __all__ = ["Equilibrium", "NewtonOptions", "NotConvergedError", "find_equilibrium"]
@@ -98,7 +98,7 @@ ROUNDING = 1e-9
 
 def find_equilibrium(
     system: System,
-    linear: LinearSolver,
+    linear: StiffnessSolver,
     guess: State,
     fraction: float,
     options: NewtonOptions,
@@ -182,7 +182,7 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
     the full step all the same: they are the solution of the linear problem, not something to be approached.
     """
     du = step.du
-    lagged = system.advanced(state, du, step.base).lagged
+    lagged = system.advanced(state, du, step.base, step.unmet).lagged
     damping = system.longest_step(state, du)
     smallest = SMALLEST_DAMPING * damping
     while damping >= smallest:
@@ -222,7 +222,7 @@ def _balances(system: System, state: State, du: Floats) -> bool:
 
 def _accepted(
     system: System,
-    linear: LinearSolver,
+    linear: StiffnessSolver,
     state: State,
     fraction: float,
     control: Control | None,

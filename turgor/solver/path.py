@@ -14,10 +14,10 @@ from turgor.common.log import logger
 from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
 from turgor.solver.events import Event
 from turgor.solver.limits import after_snap
-from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
@@ -164,7 +164,7 @@ class _Walk:
         self.options = options
         self.on_equilibrium = on_equilibrium
         self.on_progress = on_progress
-        self.linear: LinearSolver = make_linear_solver(system.pattern.row_start, system.pattern.column)
+        self.linear = make_stiffness_solver(system, self.options.newton.linear)
         self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
         self.past: tuple[Equilibrium, ...] = ()
         self.step = options.largest_step

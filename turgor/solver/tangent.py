@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from turgor.common.errors import SolverError
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.choice import LinearPath
 from turgor.solver.control import Control
-from turgor.solver.linear import LinearSolver, SingularMatrixError
+from turgor.solver.linear import SingularMatrixError
+from turgor.solver.stiffness import ACCURATE, FORCING, Solution, StiffnessSolver
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +31,13 @@ class NewtonOptions:
         largest of the forces in it (internal, pressure, weight …), reactions included. It has no unit.
     max_iterations
         Tangents that may be factorised for one equilibrium.
+    linear
+        How linear problems are solved (:func:`turgor.solver.choice.make_stiffness_solver`).
     """
 
     tolerance: float = 1e-7
     max_iterations: int = 25
+    linear: LinearPath = "auto"
 
 
 class NotConvergedError(SolverError):
@@ -71,11 +76,15 @@ SHORTER = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A change of displacement and load fraction; `base`: the state of an earlier tangent that it was found with."""
+    """A change of displacement and load fraction; `base`: the state of an earlier tangent that it was found with.
+
+    `unmet` is what an iterative solver left of the equations of the dilatations (:class:`Solution`).
+    """
 
     du: Floats
     change: float
     base: State | None = None
+    unmet: tuple[Floats, ...] = ()
 
 
 class Progress:
@@ -110,7 +119,7 @@ class Tangent:
     def __init__(
         self,
         system: System,
-        linear: LinearSolver,
+        linear: StiffnessSolver,
         state: State,
         fraction: float,
         control: Control | None,
@@ -124,19 +133,18 @@ class Tangent:
         self._size, self._uses = 0.0, 0
         self.compliance: float | None = None
         if control is not None:
-            self._response = self._solve(-system.load_direction(state, system.growth(fraction)))
+            self._response = self._solve(-system.load_direction(state, system.growth(fraction)), ACCURATE)
             self._measured = system.load_direction(state, control.weights)
-            self.compliance = -float(np.vdot(self._measured, self._response))
+            self.compliance = -float(np.vdot(self._measured, self._response.u))
         progress.tangents.append((self.residual, self.negative_pivots or 0))
 
     def solved(self, residual: Floats, pending: Floats | None) -> Step:
         """Return Newton's step from the state of the tangent, the `pending` given displacements imposed with it."""
-        if pending is None:
-            du = self.system.nodal(self.linear.solve(-residual))
-        else:
-            right = residual + self.system.free_part(self.system.stiffness_times(pending))
-            du = self.system.nodal(self.linear.solve(-right)) + pending
-        step = self._controlled(Step(du, 0.0), self.state, self._fraction)
+        if pending is not None:
+            residual = residual + self.system.free_part(self.system.stiffness_times(pending))
+        found = self.linear.solution(self.system, -residual)
+        du = found.u if pending is None else found.u + pending
+        step = self._controlled(replace(found, u=du), None, self.state, self._fraction)
         self._size = float(np.linalg.norm(step.du))
         return step
 
@@ -145,11 +153,11 @@ class Tangent:
 
         ``None`` where it is not much shorter than the last one: a new tangent will get on faster.
         """
-        if self._uses == USES:
+        if self._uses == USES or not self.linear.serves_again:
             return None
         self._uses += 1
-        step = Step(self._solve(-self.system.mixed_force(state, self.state)), 0.0, self.state)
-        step = self._controlled(step, state, fraction)
+        found = self._solve(-self.system.mixed_force(state, self.state))
+        step = self._controlled(found, self.state, state, fraction)
         size = float(np.linalg.norm(step.du))
         # Written so that what is not a number is not shorter.
         if not size < SHORTER * self._size:
@@ -166,22 +174,23 @@ class Tangent:
         away = float(np.linalg.norm(state.u - self.state.u))
         return self.residual <= NEAR or away <= NEARBY * float(np.linalg.norm(state.u))
 
-    def _solve(self, nodal: Floats) -> Floats:
-        return self.system.nodal(self.linear.solve(self.system.free_part(nodal)))
+    def _solve(self, nodal: Floats, accuracy: float = FORCING) -> Solution:
+        return self.linear.solution(self.system, self.system.free_part(nodal), accuracy)
 
-    def _controlled(self, step: Step, state: State, fraction: float) -> Step:
-        """Return the step with which the linearised control holds too."""
+    def _controlled(self, found: Solution, base: State | None, state: State, fraction: float) -> Step:
+        """Return the step from a state with which the linearised control holds too."""
         control = self._control
         if control is None or self.compliance is None:
-            return step
+            return Step(found.u, 0.0, base, found.unmet)
         value, by_conjugate, by_fraction = control.gap(self.system.conjugate(state, control.weights), fraction)
-        value -= by_conjugate * float(np.vdot(self._measured, step.du))
+        value -= by_conjugate * float(np.vdot(self._measured, found.u))
         slope = by_conjugate * self.compliance + by_fraction
         if slope == 0.0:
             # Nothing is loaded yet: a rigid body that moves has not met anything.
             raise NotConvergedError("there is no load that the control could follow")
         change = -value / slope
-        return replace(step, du=step.du + change * self._response, change=change)
+        found = found.plus(change, self._response)
+        return Step(found.u, change, base, found.unmet)
 
 
 def _wanders(residuals: list[float], tolerance: float) -> bool:
@@ -194,19 +203,16 @@ def _wanders(residuals: list[float], tolerance: float) -> bool:
     return sum(last > 10.0 * tolerance and now > RISE * last for last, now in pairs) >= RISES
 
 
-def factorise_tangent(system: System, linear: LinearSolver, state: State, residuals: Sequence[float] = ()) -> None:
-    """Factorise the stiffness of a state, whose pattern is a new one where surfaces have come close to each other.
+def factorise_tangent(system: System, linear: StiffnessSolver, state: State, residuals: Sequence[float] = ()) -> None:
+    """Make ready to solve with the stiffness of a state.
 
     Raises
     ------
     NotConvergedError
         If it is singular; with the `residuals` of the iteration that led there, if any.
     """
-    values = system.stiffness(state)
-    if linear.column is not system.pattern.column:
-        linear.take(system.pattern.row_start, system.pattern.column)
     try:
-        linear.factorise(values)
+        linear.take_stiffness(system, state)
     except SingularMatrixError as error:
         raise failure("the stiffness is singular", system, state, residuals) from error
 

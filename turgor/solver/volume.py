@@ -16,9 +16,9 @@ from turgor.common.log import logger
 from turgor.fem.system import System
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
-from turgor.solver.linear import LinearSolver
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
+from turgor.solver.stiffness import StiffnessSolver
 from turgor.solver.tangent import factorise_tangent
 
 log = logger("solver")
@@ -85,7 +85,7 @@ class VolumeWalk:
     def __init__(
         self,
         system: System,
-        linear: LinearSolver,
+        linear: StiffnessSolver,
         start: Equilibrium,
         step: float,
         options: NewtonOptions,
@@ -201,14 +201,14 @@ class VolumeWalk:
         return replace(equilibrium, compliance=found)
 
 
-def compliance(system: System, linear: LinearSolver, equilibrium: Equilibrium, weights: Floats | None) -> float:
+def compliance(system: System, linear: StiffnessSolver, equilibrium: Equilibrium, weights: Floats | None) -> float:
     """Return dQ/df along the path of equilibria, by the tangent that was factorised last."""
     growth = system.growth(equilibrium.fraction)
     response = linear.solve(system.free_part(system.load_direction(equilibrium.state, growth)))
     return float(system.free_part(system.load_direction(equilibrium.state, weights)) @ response)
 
 
-def softest_mode(system: System, linear: LinearSolver, equilibrium: Equilibrium) -> Floats:
+def softest_mode(system: System, linear: StiffnessSolver, equilibrium: Equilibrium) -> Floats:
     """Return the eigenmode of the tangent's smallest eigenvalue in size, ``(n_points, d)``, largest component one.
 
     By inverse iteration, from the load's direction and a little of everything: at a bifurcation the load has no part

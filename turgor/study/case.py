@@ -25,6 +25,7 @@ from turgor.common.units import PositiveLength, to_internal
 from turgor.fem.system import System
 from turgor.geometry.imported.mesh_file import MeshFile
 from turgor.geometry.space import Space
+from turgor.solver.choice import LinearPath
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
 from turgor.study.boundary import DisplacementCase, Load, PressureCase, Support
@@ -87,10 +88,11 @@ class SolverCase(StrictModel):
     max_iterations: Count = Field(default=25, le=1000, description="linear solves allowed for one state")
     largest_step: Part = Field(default=1.0, description="longest step, as part of the load")
     smallest_step: Part = Field(default=1e-3, description="shortest step tried before giving up")
+    linear: LinearPath = Field(default="auto", description="whether linear problems are factorised or iterated on")
 
     def options(self, *, post_snap: bool = False) -> PathOptions:
         """Return the options of the load path."""
-        newton = NewtonOptions(tolerance=self.tolerance, max_iterations=self.max_iterations)
+        newton = NewtonOptions(self.tolerance, self.max_iterations, self.linear)
         return PathOptions(newton, self.largest_step, self.smallest_step, post_snap)
 
     @model_validator(mode="after")

@@ -1,0 +1,251 @@
+"""The iterative path finds what the factorisation finds, at any bulk modulus and mesh, and says where it cannot."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from samples import neo_hookean, random_state
+
+from turgor.common.errors import InputError
+from turgor.common.optional import is_available
+from turgor.fem.loads import Pressure
+from turgor.fem.section import PlaneStrain
+from turgor.fem.supports import Clamped, Prescribed, Sliding
+from turgor.fem.system import System
+from turgor.geometry.tube import CappedTube
+from turgor.mesh.cells import body_cell
+from turgor.mesh.generate import generate
+from turgor.mesh.structured import box, rectangle, shell_octant
+from turgor.solver import choice, coarse, iterative
+from turgor.solver.blocks import BlockRows, multiply
+from turgor.solver.choice import make_stiffness_solver
+from turgor.solver.iterative import AUGMENTATION, Iterative
+from turgor.solver.krylov import gmres
+from turgor.solver.linear import LinearSolver, make_linear_solver
+from turgor.solver.multigrid import TwoLevels, corner_interpolation
+from turgor.solver.newton import NewtonOptions, find_equilibrium
+from turgor.solver.path import LimitPressureError, PathOptions, solve_path
+
+PLANES = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
+TUBE = CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm")
+
+
+def sphere(cell_type, n=2, ratio=1e3, pressure=0.02):
+    return System(
+        shell_octant(1.0, 1.5, n, cell_type), {"body": neo_hookean(ratio=ratio)}, PLANES, [Pressure("inner", pressure)]
+    )
+
+
+def tube(size, ratio=1e3):
+    return System(
+        generate(TUBE, size), {"body": neo_hookean(ratio=ratio)}, [Clamped("mount")], [Pressure("cavity", 0.015)]
+    )
+
+
+def direct(system):
+    return make_linear_solver(system.pattern.row_start, system.pattern.column)
+
+
+def full(upper):
+    return upper + np.triu(upper, 1).T
+
+
+def dense(system, values):
+    n = system.n_dofs
+    return full(sp.csr_matrix((values, system.pattern.column, system.pattern.row_start), shape=(n, n)).toarray())
+
+
+@pytest.mark.parametrize("ratio", [1e3, 1e5])
+@pytest.mark.parametrize("build", [lambda r: tube(3.0, r), lambda r: sphere("hex27", 2, r)], ids=["tet10", "hex27"])
+def test_it_finds_the_same_equilibrium_as_the_factorisation(build, ratio, monkeypatch):
+    monkeypatch.setattr(LinearSolver, "serves_again", False)  # Newton's method with exact steps
+    system = build(ratio)
+    solver = Iterative(system)
+    rest, options = system.reference_state(), NewtonOptions()
+    expected = find_equilibrium(system, direct(system), rest, 1.0, options)
+    found = find_equilibrium(system, solver, rest, 1.0, options)
+    largest = np.abs(expected.state.u).max()
+    assert largest > 0.05
+    assert np.abs(found.state.u - expected.state.u).max() <= 1e-6 * largest
+    assert found.residuals[-1] <= options.tolerance
+    assert found.iterations <= expected.iterations + 2
+    assert len(solver.iterations) == found.iterations
+    assert max(solver.iterations) <= 30
+    assert found.negative_pivots is None
+    assert found.stable is None
+
+
+def test_inner_iterations_do_not_depend_on_the_mesh():
+    counts, unknowns = [], []
+    for system in (sphere("tet10", 2), sphere("tet10", 4), tube(4.0), tube(2.0)):
+        solver = Iterative(system)
+        find_equilibrium(system, solver, system.reference_state(), 1.0, NewtonOptions())
+        counts.append(np.mean(solver.iterations))
+        unknowns.append(system.n_dofs)
+    assert unknowns[1] > 6 * unknowns[0]
+    assert unknowns[3] > 3 * unknowns[2]
+    assert counts[1] <= 1.3 * counts[0]
+    assert counts[3] <= 1.3 * counts[2]
+    assert max(counts) < 20
+
+
+@pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
+def test_the_split_stiffness_is_the_stiffness(cell_type):
+    system = sphere(cell_type, 1)
+    state = random_state(system, 0.005)
+    whole = dense(system, system.stiffness(state))
+    values, (equations,) = system.split_stiffness(state, AUGMENTATION)
+    rest = np.zeros((system.mesh.points.size,) * 2)
+    for nodes, gradient, bulk in zip(equations.nodes, equations.gradient, equations.bulk, strict=True):
+        places = 3 * nodes + np.arange(3)[:, None]
+        flat = gradient.reshape(len(gradient), -1)
+        rest[np.ix_(places.ravel(), places.ravel())] += flat.T @ bulk @ flat
+    free = system.pattern.free
+    softer = dense(system, values)
+    np.testing.assert_allclose(softer + rest[np.ix_(free, free)], whole, atol=1e-11 * np.abs(whole).max())
+    assert np.abs(softer).max() < 0.1 * np.abs(whole).max()
+
+
+def test_block_rows_hold_the_matrix_and_identity_where_components_are_fixed():
+    system = sphere("tet10", 1)
+    values = system.stiffness(random_state(system, 0.005))
+    rows = BlockRows(system.pattern)
+    n = len(rows.order)
+    whole = np.eye(3 * n)
+    free = system.pattern.free
+    whole[np.ix_(free, free)] = dense(system, values)
+    x = np.random.default_rng(0).standard_normal((n, 3))
+    product = np.empty(3 * n)
+    multiply(rows.start, rows.column, rows.values(values), x[rows.order].ravel(), product)
+    np.testing.assert_allclose(product.reshape(n, 3)[rows.rank].ravel(), whole @ x.ravel(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
+def test_the_cycle_is_symmetric_positive_definite_and_near_the_inverse(cell_type):
+    system = System(box((1.0, 1.0, 6.0), (1, 1, 6), cell_type), {"body": neo_hookean()}, PLANES)
+    assert len(BlockRows(system.pattern).bounds) > 2  # or else no portion has a neighbour
+    levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
+    values, _ = system.split_stiffness(system.reference_state(), AUGMENTATION)
+    levels.update(levels.rows.values(values))
+    free = levels.free.ravel()
+    columns = []
+    for k in np.flatnonzero(free):
+        unit = np.zeros(len(free))
+        unit[k] = 1.0
+        columns.append(levels.apply(unit)[free])
+    cycle = np.array(columns)
+    np.testing.assert_allclose(cycle, cycle.T, atol=1e-5 * np.abs(cycle).max())
+    number = np.cumsum(system.pattern.free).reshape(-1, 3)[levels.rows.order].ravel()[free] - 1
+    matrix = dense(system, values)[np.ix_(number, number)]
+    root = np.linalg.cholesky(matrix)
+    spectrum = np.linalg.eigvalsh(root.T @ (0.5 * (cycle + cycle.T)) @ root)
+    assert spectrum[0] > 0.1
+    assert spectrum[-1] < 1.0 + 1e-3  # of a symmetric cycle with exact coarse solution
+
+
+@pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
+def test_interpolation_from_the_corners_reproduces_linear_fields(cell_type):
+    mesh = box((1.0, 2.0, 3.0), (2, 1, 2), cell_type)
+    up = corner_interpolation(mesh.cells)
+    corners = np.unique(mesh.cells[:, : body_cell(mesh.cells).n_corners])
+    assert up.shape == (mesh.n_points, len(corners))
+    np.testing.assert_allclose(up @ mesh.points[corners], mesh.points, atol=1e-12)
+
+
+@pytest.mark.skipif(not is_available("pyamg"), reason="PyAMG is not installed")
+def test_the_coarse_level_may_be_solved_by_algebraic_multigrid(monkeypatch):
+    system = tube(2.0)
+    rest, options = system.reference_state(), NewtonOptions()
+    factorised = Iterative(system)
+    expected = find_equilibrium(system, factorised, rest, 1.0, options)
+    monkeypatch.setattr(coarse, "FACTORISED", 0)
+    solver = Iterative(system)
+    assert isinstance(solver._levels._solver, coarse.SmoothedAggregation)
+    found = find_equilibrium(system, solver, rest, 1.0, options)
+    assert np.abs(found.state.u - expected.state.u).max() <= 1e-6 * np.abs(expected.state.u).max()
+    assert max(solver.iterations) <= 40
+    assert sum(solver.iterations) > sum(factorised.iterations)
+
+
+def test_rigid_body_modes_do_no_work():
+    mesh = box((1.0, 2.0, 3.0), (1, 1, 1))
+    system = System(mesh, {"body": neo_hookean()}, [Clamped("x0")])
+    state = system.reference_state()
+    system.stiffness(state)
+    for mode in coarse.rigid_body_modes(mesh.points).T:
+        force = system.stiffness_times(mode.reshape(-1, 3))
+        assert np.abs(mode).max() > 0.1
+        assert np.abs(force).max() < 1e-9 * np.abs(system.stiffness_times(mesh.points)).max()
+
+
+def test_what_it_cannot_solve_is_factorised(monkeypatch, caplog):
+    system = sphere("tet10")
+    monkeypatch.setattr(iterative, "MOST_ITERATIONS", 2)
+    solver = Iterative(system)
+    rest, options = system.reference_state(), NewtonOptions()
+    found = find_equilibrium(system, solver, rest, 1.0, options)
+    expected = find_equilibrium(system, direct(system), rest, 1.0, options)
+    np.testing.assert_allclose(found.state.u, expected.state.u, atol=1e-7 * np.abs(expected.state.u).max())
+    assert found.stable
+    assert caplog.text.count("has not converged within 2 iterations") == iterative.FAILURES
+    assert len(solver.iterations) == iterative.FAILURES
+
+
+def test_it_follows_the_path_by_volume_to_the_same_limit():
+    limits = []
+    for path in ("direct", "iterative"):
+        with pytest.raises(LimitPressureError) as caught:
+            solve_path(sphere("hex27", 1, pressure=0.1), [1.0], options=PathOptions(NewtonOptions(linear=path)))
+        limits.append(caught.value.limit.equilibrium.fraction)
+    assert limits[0] < 1.0
+    assert limits[1] == pytest.approx(limits[0], rel=1e-5)
+
+
+def test_gmres():
+    rng = np.random.default_rng(0)
+    matrix = rng.standard_normal((90, 90)) + 12.0 * np.diag(np.sign(rng.standard_normal(90)))
+    right, zero = rng.standard_normal(90), np.zeros(90)
+    exact = np.linalg.solve(matrix, right)
+    for preconditioner in (np.eye(90), np.diag(1.0 / np.diag(matrix))):
+        found, iterations, converged = gmres(matrix.__matmul__, preconditioner.__matmul__, right, zero, 1e-8, 400)
+        assert converged
+        assert 10 < iterations < 200
+        np.testing.assert_allclose(found, exact, atol=1e-5)
+    *_, converged = gmres(matrix.__matmul__, np.eye(90).__matmul__, right, zero, 1e-8, 5)
+    assert not converged
+    found, iterations, converged = gmres(matrix.__matmul__, np.eye(90).__matmul__, zero, zero, 1e-8, 5)
+    assert converged
+    assert iterations == 0
+    assert not found.any()
+
+
+def test_the_path_is_chosen_by_size(monkeypatch):
+    system = sphere("tet10")
+    assert isinstance(make_stiffness_solver(system), LinearSolver)
+    assert isinstance(make_stiffness_solver(system, "iterative"), Iterative)
+    monkeypatch.setattr(choice, "ITERATIVE_FROM", system.n_dofs)
+    assert isinstance(make_stiffness_solver(system), Iterative)
+    assert isinstance(make_stiffness_solver(system, "direct"), LinearSolver)
+
+
+def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
+    body = {"body": neo_hookean()}
+    cube = box((1.0, 1.0, 1.0), (1, 1, 1))
+    cases = {
+        "given displacements": System(cube, body, [Clamped("x0"), Prescribed("x1", (0.1, None, None))]),
+        "oblique": System(shell_octant(1.0, 1.5, 1), body, [Sliding("outer"), Clamped("x0")]),
+        "plane models": System(rectangle((1.0, 1.0), (1, 1)), body, [Clamped("x0")], section=PlaneStrain(1.0)),
+    }
+    with caplog.at_level(logging.INFO):
+        for reason, system in cases.items():
+            caplog.clear()
+            assert isinstance(make_stiffness_solver(system, "iterative"), LinearSolver)
+            assert reason in caplog.text
+
+
+def test_an_unknown_path_is_refused():
+    with pytest.raises(InputError, match="iterative"):
+        make_stiffness_solver(sphere("tet10", 1), "krylov")

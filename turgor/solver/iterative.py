@@ -1,0 +1,224 @@
+"""Large systems in space: displacements and pressures by a Krylov method with a block preconditioner.
+
+The stiffness with condensed pressures is A + Bᵀ E B, whose condition number grows with the bulk modulus. With the
+pressures as unknowns the same step solves
+
+    [ A   Bᵀ  ] [δu]   [r]
+    [ B  −E⁻¹ ] [q ] = [0],
+
+which the preconditioner [M Bᵀ; 0 −S]⁻¹ turns into one whose eigenvalues gather around one, at any bulk modulus and
+size of mesh (Elman, Silvester and Wathen 2014, ch. 4). M⁻¹ is one cycle of multigrid for A
+(:mod:`turgor.solver.multigrid`), S = E⁻¹ + V/((1 + γ) μ) stands for the Schur complement. A keeps γ shear moduli of the
+bulk modulus: an augmented Lagrangian (Benzi and Olshanskii 2006), which holds it definite where pressures are of the
+order of μ.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from turgor.common.log import logger
+from turgor.fem.pattern import SparsePattern
+from turgor.fem.state import State
+from turgor.fem.system import System
+from turgor.fem.volumes import VolumeEquations
+from turgor.solver.blocks import multiply
+from turgor.solver.krylov import gmres
+from turgor.solver.linear import LinearSolver, make_linear_solver
+from turgor.solver.multigrid import TwoLevels
+from turgor.solver.stiffness import ACCURATE, FORCING, Solution, StiffnessSolver
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+log = logger("solver")
+
+AUGMENTATION = 5.0
+"""γ: shear moduli of the bulk modulus that stay in A.
+
+With less, the pressures are harder to find; with more, A is harder to smooth.
+"""
+
+MOST_ITERATIONS = 180
+"""Of one linear problem; then it is factorised."""
+
+FAILURES = 3
+"""Tangents on which the method has failed, after which all are factorised."""
+
+
+class Iterative(StiffnessSolver):
+    """GMRES for the mixed problem of one system; what it does not solve is factorised.
+
+    Attributes
+    ----------
+    iterations
+        Those of each linear problem so far.
+    """
+
+    name: ClassVar[str] = "GMRES with multigrid"
+    serves_again: ClassVar[bool] = False
+
+    def __init__(self, system: System) -> None:
+        self.iterations: list[int] = []
+        self._levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
+        self._system = system
+        # Of each free component, in the order of the rows, its number among the unknowns.
+        number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[self._levels.rows.order] - 1
+        self._number: Ints = number[self._levels.free]
+        self._direct: LinearSolver | None = None
+        self._factorised = False
+        self._failures = 0
+
+    def take_stiffness(self, system: System, state: State) -> None:
+        """Set up the mixed problem and its preconditioner."""
+        assert system is self._system
+        self._factorised = False
+        self._state = state
+        if self._failures >= FAILURES:
+            self._factors()
+            return
+        values, equations = system.split_stiffness(state, AUGMENTATION)
+        self._A = self._levels.rows.values(values)
+        self._levels.update(self._A)
+        self._volumes = _Volumes(self._levels, equations)
+
+    def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
+        """Return the step for a right-hand side ``(n,)``, with what it leaves of the volume equations."""
+        if self._factorised or (found := self._solution(right, accuracy)) is None:
+            u = system.nodal(self._factors().solve(right))
+            return Solution(u, tuple(np.zeros((len(s.nodes), s.modes.shape[2])) for s in system.solids))
+        u, q = found
+        return Solution(system.nodal(self._free_part(u)), self._volumes.unmet(u, q))
+
+    def solve(self, right: Floats) -> Floats:
+        """Return the displacements ``(n,)``."""
+        if self._factorised or (found := self._solution(right, ACCURATE)) is None:
+            return self._factors().solve(right)
+        return self._free_part(found[0])
+
+    @property
+    def negative_pivots(self) -> int | None:
+        """Unknown, unless the stiffness had to be factorised."""
+        return self._factors().negative_pivots if self._factorised else None
+
+    def _solution(self, right: Floats, accuracy: float) -> tuple[Floats, Floats] | None:
+        volumes, n = self._volumes, 3 * len(self._levels.free)
+        load = np.zeros(n)
+        load[self._levels.free.ravel()] = right[self._number]
+        # At the out-of-balance force, what the lagging pressures leave of it is much less than all.
+        lagging = volumes.start
+        if np.linalg.norm(load - volumes.forces(lagging)) > np.linalg.norm(load):
+            lagging = np.zeros_like(lagging)
+        x, iterations, converged = gmres(
+            self._times,
+            self._precondition,
+            np.concatenate([load, np.zeros(len(lagging))]),
+            np.concatenate([np.zeros(n), lagging]),
+            accuracy,
+            MOST_ITERATIONS,
+        )
+        self.iterations.append(iterations)
+        log.debug("%d iterations of %s", iterations, self.name)
+        if converged:
+            return x[:n], x[n:]
+        self._failures += 1
+        log.warning("%s has not converged within %d iterations: factorising", self.name, iterations)
+        return None
+
+    def _times(self, x: Floats) -> Floats:
+        rows, volumes = self._levels.rows, self._volumes
+        n = 3 * len(rows.order)
+        forces = np.empty(n)
+        multiply(rows.start, rows.column, self._A, x[:n], forces)
+        return np.concatenate([forces + volumes.forces(x[n:]), volumes.residual(x[:n], x[n:])])
+
+    def _precondition(self, x: Floats) -> Floats:
+        n = 3 * len(self._levels.rows.order)
+        q = self._volumes.pressures(x[n:])
+        return np.concatenate([self._levels.apply(x[:n] - self._volumes.forces(q)), q])
+
+    def _free_part(self, u: Floats) -> Floats:
+        part = np.empty(self._system.n_dofs)
+        part[self._number] = u.reshape(-1, 3)[self._levels.free]
+        return part
+
+    def _factors(self) -> LinearSolver:
+        """Return a direct solver with the stiffness factorised."""
+        pattern: SparsePattern = self._system.pattern
+        if self._direct is None:
+            self._direct = make_linear_solver(pattern.row_start, pattern.column)
+        if not self._factorised:
+            self._direct.take_stiffness(self._system, self._state)
+            self._factorised = True
+        return self._direct
+
+
+class _Volumes:
+    """The volume equations of all solids, scaled so that S is the identity, and their rows to forces."""
+
+    def __init__(self, levels: TwoLevels, equations: list[VolumeEquations]) -> None:
+        self._equations = equations
+        self._factor, self._compliance, gradients, start, weight = [], [], [], [], []
+        for eq in equations:
+            m, k = eq.lag.shape
+            compliance = np.linalg.inv(eq.bulk)
+            schur = compliance + (eq.volume / eq.modulus)[:, None, None] * np.eye(k)
+            factor = np.linalg.cholesky(schur)
+            inverse = np.linalg.inv(factor)
+            self._factor.append(factor)
+            self._compliance.append(inverse @ compliance @ inverse.swapaxes(1, 2))
+            free = levels.free[levels.rows.rank[eq.nodes]].transpose(0, 2, 1).reshape(m, 1, -1)
+            gradients.append(inverse @ (eq.gradient.reshape(m, k, -1) * free))
+            rate = eq.bulk @ (eq.volume[:, None] * eq.lag)[:, :, None]
+            start.append((factor.swapaxes(1, 2) @ rate).ravel())
+            weight.append(np.repeat(np.sqrt(eq.modulus * np.cbrt(eq.volume)), k))
+        self._B = _gradient_matrix(levels, equations, gradients)
+        self._Bt = self._B.T.tocsr()
+        self._weight = np.concatenate(weight)
+        self.start = np.concatenate(start)
+        self._cuts = np.cumsum([eq.lag.size for eq in equations])[:-1]
+
+    def forces(self, q: Floats) -> Floats:
+        """Return Bᵀ q."""
+        return np.asarray(self._Bt @ q)
+
+    def residual(self, u: Floats, q: Floats) -> Floats:
+        """Return B u − E⁻¹ q as forces."""
+        return np.asarray(self._weight * self._gaps(u, q))
+
+    def pressures(self, residual: Floats) -> Floats:
+        """Return −S⁻¹ of a residual."""
+        return np.asarray(-residual / self._weight)
+
+    def unmet(self, u: Floats, q: Floats) -> tuple[Floats, ...]:
+        """Return for each solid the dilatations that `u` has and `q` does not, ``(m, k)``."""
+        parts = np.split(self._gaps(u, q), self._cuts)
+        return tuple(
+            (factor @ part.reshape(*eq.lag.shape, 1))[:, :, 0] / eq.volume[:, None]
+            for eq, factor, part in zip(self._equations, self._factor, parts, strict=True)
+        )
+
+    def _gaps(self, u: Floats, q: Floats) -> Floats:
+        parts = np.split(q, self._cuts)
+        products = [
+            (c @ part.reshape(*eq.lag.shape, 1)).ravel()
+            for eq, c, part in zip(self._equations, self._compliance, parts, strict=True)
+        ]
+        return np.asarray(self._B @ u - np.concatenate(products))
+
+
+def _gradient_matrix(levels: TwoLevels, equations: list[VolumeEquations], gradients: list[Floats]) -> sp.csr_matrix:
+    data, column, width = [], [], []
+    for eq, gradient in zip(equations, gradients, strict=True):
+        m, k = eq.lag.shape
+        places = 3 * levels.rows.rank[eq.nodes][:, None, :] + np.arange(3, dtype=np.int32)[:, None]
+        column.append(np.broadcast_to(places.reshape(m, 1, -1), gradient.shape).ravel())
+        data.append(gradient.ravel())
+        width.append(np.full(m * k, gradient.shape[2]))
+    start = np.concatenate([[0], np.cumsum(np.concatenate(width))])
+    shape = (len(start) - 1, 3 * len(levels.free))
+    return sp.csr_matrix((np.concatenate(data), np.concatenate(column), start), shape=shape)

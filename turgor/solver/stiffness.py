@@ -1,0 +1,76 @@
+"""What Newton's method asks of a solver of its linear problems, whichever way it goes about them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.fem.state import State
+from turgor.fem.system import System
+
+Floats = NDArray[np.float64]
+
+FORCING = 1e-3
+"""Part of the linear problem's residual that one step of Newton's method may leave."""
+
+ACCURATE = 1e-6
+"""The same where the solution counts for itself: a compliance, an eigenmode."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Of a linear problem of Newton's method.
+
+    Attributes
+    ----------
+    u
+        Change of the displacement, ``(n_points, d)``, mm.
+    unmet
+        For each solid, by how much the dilatations that belong to the pressures found fall short of those of `u`,
+        ``(m, k)``; empty where they agree.
+    """
+
+    u: Floats
+    unmet: tuple[Floats, ...] = ()
+
+    def plus(self, factor: float, other: Solution) -> Solution:
+        """Return this one and a multiple of another."""
+        unmet = tuple(a + factor * b for a, b in zip(self.unmet, other.unmet, strict=True))
+        return Solution(self.u + factor * other.u, unmet)
+
+
+class StiffnessSolver(ABC):
+    """Solves with the stiffness of one state after another.
+
+    ``serves_again`` says whether it is worth while to go on with the stiffness of an earlier state.
+    """
+
+    name: ClassVar[str]
+    serves_again: ClassVar[bool] = True
+
+    @abstractmethod
+    def take_stiffness(self, system: System, state: State) -> None:
+        """Make ready to solve with the stiffness of a state.
+
+        Raises
+        ------
+        SingularMatrixError
+            If it cannot be done.
+        """
+
+    @abstractmethod
+    def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
+        """Return the solution for a right-hand side ``(n,)``, to `accuracy` at least."""
+
+    @abstractmethod
+    def solve(self, right: Floats) -> Floats:
+        """Return the solution ``(n,)`` for a right-hand side ``(n,)``, as accurate as can be."""
+
+    @property
+    @abstractmethod
+    def negative_pivots(self) -> int | None:
+        """Number of negative eigenvalues of the stiffness taken last, ``None`` where the solver cannot tell."""
