@@ -15,8 +15,8 @@ SIX = [Row(name, name) for name in ("bellows", "membrane", "pneunet", "honeycomb
 def main() -> None:
     """Run the examples that are asked for, one after the other."""
     rows, threads = asked_for(__doc__, SIX, threads=2)
-    print("| example | elements | unknowns | states | iterations | wall, s | ended |")
-    print("|---|--:|--:|--:|--:|--:|---|")
+    print("| example | elements | unknowns | states | factorisations | iterations | wall, s | ended |")
+    print("|---|--:|--:|--:|--:|--:|--:|---|")
     total = 0.0
     for row in rows:
         found = run_example(row.example, row.changes, threads)

@@ -43,11 +43,12 @@ class Ran:
 
     @property
     def counts(self) -> str:
-        """Elements, unknowns, states and iterations, as cells of a Markdown row."""
+        """Elements, unknowns, states, factorisations and iterations, as cells of a Markdown row."""
         if not self.summary:
-            return " | | |"
+            return " | | | |"
         mesh, solver = self.summary["mesh"], self.summary["solver"]
-        return f"{mesh['elements']} | {mesh['dofs']} | {solver['steps']} | {solver['iterations']}"
+        work = f"{solver['factorisations']} | {solver['iterations']}"
+        return f"{mesh['elements']} | {mesh['dofs']} | {solver['steps']} | {work}"
 
     @property
     def ended(self) -> str:
@@ -90,8 +91,8 @@ def asked_for(description: str | None, rows: Sequence[Row], threads: int = 1) ->
 
 def print_displacements(rows: Sequence[Row], threads: int) -> dict[str, Ran]:
     """Run rows one after the other; print of each the largest displacement at its pressures, and what it took."""
-    print("| | paper, mm | ours, mm | elements | unknowns | states | iterations | wall, s | ended |")
-    print("|---|---|---|--:|--:|--:|--:|--:|---|")
+    print("| | paper, mm | ours, mm | elements | unknowns | states | factorisations | iterations | wall, s | ended |")
+    print("|---|---|---|--:|--:|--:|--:|--:|--:|---|")
     ran: dict[str, Ran] = {}
     for row in rows:
         found = ran[row.name] = run_example(row.example, row.changes, threads)
