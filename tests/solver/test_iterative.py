@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+import numba
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -20,7 +21,7 @@ from turgor.mesh.cells import body_cell
 from turgor.mesh.generate import generate
 from turgor.mesh.structured import box, rectangle, shell_octant
 from turgor.solver import choice, coarse, iterative
-from turgor.solver.blocks import BlockRows, multiply
+from turgor.solver.blocks import BlockRows, invert_diagonal, multiply, sweep_backward, sweep_forward
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.iterative import AUGMENTATION, Iterative
 from turgor.solver.krylov import gmres
@@ -249,3 +250,28 @@ def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
 def test_an_unknown_path_is_refused():
     with pytest.raises(InputError, match="iterative"):
         make_stiffness_solver(sphere("tet10", 1), "krylov")
+
+
+def test_the_sweeps_do_not_depend_on_the_threads():
+    threads = numba.get_num_threads()
+    system = System(box((1.0, 1.0, 30.0), (1, 1, 30)), {"body": neo_hookean()}, PLANES)
+    rows = BlockRows(system.pattern)
+    assert len(rows.bounds) > 5
+    values = rows.values(system.stiffness(system.reference_state()))
+    inverse = np.empty((len(rows.order), 3, 3))
+    invert_diagonal(rows.start, rows.diagonal, values, inverse)
+    right = np.random.default_rng(0).standard_normal(3 * len(rows.order))
+    found = []
+    try:
+        for number in (1, threads):
+            numba.set_num_threads(number)
+            x = np.zeros_like(right)
+            for odd in (0, 1):
+                sweep_forward(rows.start, rows.column, rows.diagonal, rows.bounds, values, inverse, right, x, odd)
+            for odd in (1, 0):
+                sweep_backward(rows.start, rows.column, rows.bounds, values, inverse, right, x, odd)
+            found.append(x)
+    finally:
+        numba.set_num_threads(threads)
+    assert np.linalg.norm(found[0]) > 0.0
+    np.testing.assert_array_equal(found[0], found[1])
