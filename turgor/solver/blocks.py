@@ -151,7 +151,7 @@ def row_product(start, values, a, i, first, last, near):  # type: ignore[no-unty
     """Return the product of the blocks `first` to `last` of scalar row `i` of node `a` with `near`."""
     begin = 9 * start[a] + 3 * i * (start[a + 1] - start[a])
     row = values[begin + 3 * first : begin + 3 * last]
-    total = near[0] * 0
+    total = 0.0
     for m in range(len(row)):
         total += row[m] * near[m]
     return total
