@@ -63,29 +63,22 @@ class SparsePattern:
         self.n_free = int(free.sum())
         node_start, node_column = _node_pattern(n_nodes, [*groups, *couplings])
         dof_start = _dof_row_starts(node_start, dimension)
-        dof_column = np.empty(dof_start[-1], np.int32)
-        _fill_columns(node_start, node_column, dof_start, dimension, dof_column)
-        dof_row = np.repeat(np.arange(n_nodes * dimension, dtype=np.int32), np.diff(dof_start))
-        stored = free[dof_row] & free[dof_column]
-        self.n_stored = int(stored.sum())
+        place = np.empty(dof_start[-1], np.int32)
+        column = np.empty(dof_start[-1], np.int32)
+        self.row_start = np.zeros(self.n_free + 1, np.int32)
         number = np.cumsum(free, dtype=np.int32) - np.int32(1)
-        self.column = number[dof_column[stored]]
-        counts = np.bincount(number[dof_row[stored]], minlength=self.n_free)
-        self.row_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        place = np.where(stored, np.cumsum(stored) - 1, -1)
-
+        shape = (node_start, node_column, dof_start, dimension)
+        self.n_stored = int(_number(*shape, free, number, place, self.row_start, column))
+        self.column = column[: self.n_stored]
+        self._places = (*shape, place)
         sizes = [len(group) * packed_size(group.shape[1] * dimension) for group in groups]
         self.packed_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        target = np.empty(self.packed_offsets[-1], np.int32)
-        for group, begin, end in zip(groups, self.packed_offsets[:-1], self.packed_offsets[1:], strict=True):
-            block_target = target[begin:end].reshape(len(group), packed_size(group.shape[1] * dimension))
-            _find_targets(group, node_start, node_column, dof_start, dimension, place, block_target)
-        self._source_start, self._source = _invert(target, self.n_stored)
-        self._places = (node_start, node_column, dof_start, dimension, place)
+        self._sources = self._sources_of(groups)
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
-        _gather(packed, self._source_start, self._source, out)
+        out[:] = 0.0
+        _gather(packed, *self._sources, out)
 
     def covers(self, nodes: Ints) -> bool:
         """Whether all nodes of each block ``(n_blocks, nodes_per_block)`` are coupled in this pattern."""
@@ -94,10 +87,7 @@ class SparsePattern:
 
     def add_blocks(self, nodes: Ints, packed: Floats, out: Floats) -> None:
         """Add packed blocks ``(n_blocks, packed)`` that the pattern covers to the stored values `out`."""
-        target = np.empty(packed.shape, np.int32)
-        _find_targets(nodes, *self._places, target)
-        inside = target >= 0
-        out += np.bincount(target[inside], packed[inside], minlength=self.n_stored)
+        _gather(packed.ravel(), *self._sources_of([nodes]), out)
 
     def graph(self) -> sp.csr_matrix:
         """Return which nodes are coupled, both ways, ``(n_nodes, n_nodes)``.
@@ -120,6 +110,25 @@ class SparsePattern:
         """
         node_start, node_column, dof_start, dimension, place = self._places
         _expand(values, above, below, width, node_start, node_column, dof_start, dimension, place, out)
+
+    def _sources_of(self, groups: Sequence[Ints]) -> tuple[Longs, Ints]:
+        """Return the packed entries of the groups that add up to each stored value, and where each begins.
+
+        They are sought by pairs of nodes, of which there are nine times fewer.
+        """
+        node_start, node_column, _, dimension, _ = self._places
+        pairs = [_find_pairs(group, node_start, node_column) for group in groups]
+        start = np.zeros(len(node_column) + 1, np.int64)
+        for found in pairs:
+            start[1:] += np.bincount(found.ravel(), minlength=len(node_column))
+        np.cumsum(start, out=start)
+        at, source, code = start[:-1].copy(), np.empty(start[-1], np.int32), np.empty(start[-1], np.int32)
+        begin = 0
+        for group, found in zip(groups, pairs, strict=True):
+            _list_sources(group, found, begin, dimension, at, source, code)
+            begin += len(group) * packed_size(group.shape[1] * dimension)
+        begin, single = _spread(start, source, code, *self._places, self.n_stored)
+        return begin, single
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
@@ -147,54 +156,74 @@ def _dof_row_starts(node_start: NDArray[np.int64], dimension: int) -> NDArray[np
 
 
 @nb.njit(cache=True)
-def _fill_columns(node_start, node_column, dof_start, dimension, dof_column):  # type: ignore[no-untyped-def]
+def _number(node_start, node_column, dof_start, dimension, free, number, place, row_start, column):  # type: ignore[no-untyped-def]
+    """Number the entries whose row and column are free; fill their `place`, −1 for the others, and the rows."""
+    at = 0
     for a in range(len(node_start) - 1):
-        if node_start[a + 1] == node_start[a]:
-            continue
         for i in range(dimension):
-            at = dof_start[a * dimension + i]
-            for k in range(i, dimension):
-                dof_column[at] = a * dimension + k
-                at += 1
-            for m in range(node_start[a] + 1, node_start[a + 1]):
-                for k in range(dimension):
-                    dof_column[at] = node_column[m] * dimension + k
-                    at += 1
+            row = a * dimension + i
+            entry = dof_start[row]
+            for m in range(node_start[a], node_start[a + 1]):
+                for k in range(i if m == node_start[a] else 0, dimension):
+                    other = node_column[m] * dimension + k
+                    place[entry] = -1
+                    if free[row] and free[other]:
+                        place[entry] = at
+                        column[at] = number[other]
+                        at += 1
+                    entry += 1
+            if free[row]:
+                row_start[number[row] + 1] = at
+    return at
 
 
 @nb.njit(cache=True, parallel=True)
-def _find_targets(group, node_start, node_column, dof_start, dimension, place, target):  # type: ignore[no-untyped-def]
-    """Fill ``target (n_blocks, packed)``: the stored place of each packed entry, -1 where a dof is fixed."""
-    n_local = group.shape[1]
+def _find_pairs(group, node_start, node_column):  # type: ignore[no-untyped-def]
+    """Return the place of each block's pairs of nodes among all coupled pairs, ``(n_blocks, n (n + 1)/2)``."""
+    n = group.shape[1]
+    found = np.empty((len(group), n * (n + 1) // 2), np.int32)
     for block in nb.prange(len(group)):
-        # Rank of the later node's block in the earlier node's row, for each pair.
-        rank = np.zeros((n_local, n_local), np.int64)
-        for p in range(n_local):
-            for q in range(n_local):
-                low, high = group[block, p], group[block, q]
-                if low < high:
-                    first, last = node_start[low], node_start[low + 1] - 1
-                    while first < last:
-                        middle = (first + last) // 2
-                        if node_column[middle] < high:
-                            first = middle + 1
-                        else:
-                            last = middle
-                    rank[p, q] = first - node_start[low]
-        m = 0
-        for row in range(n_local * dimension):
-            p, i = row // dimension, row % dimension
-            for col in range(row, n_local * dimension):
-                q, k = col // dimension, col % dimension
+        at = 0
+        for p in range(n):
+            for q in range(p, n):
+                low = min(group[block, p], group[block, q])
+                high = max(group[block, p], group[block, q])
+                first, last = node_start[low], node_start[low + 1] - 1
+                while first < last:
+                    middle = (first + last) // 2
+                    if node_column[middle] < high:
+                        first = middle + 1
+                    else:
+                        last = middle
+                found[block, at] = first
+                at += 1
+    return found
+
+
+UPPER, AS_IT_IS, TRANSPOSED, FOLDED = 0, 1, 2, 3
+"""How a pair's entries go into the stored ones: of one node, of an earlier and a later one, of a later and an earlier
+one, and of two places in a block that are the same node."""
+
+
+@nb.njit(cache=True)
+def _list_sources(group, found, begin, dimension, at, source, code):  # type: ignore[no-untyped-def]
+    """List where the packed entries of each pair begin, `source`, and how its rows follow each other, `code`."""
+    n = group.shape[1]
+    rows = n * dimension
+    size = rows * (rows + 1) // 2
+    for block in range(len(group)):
+        pair = 0
+        for p in range(n):
+            row = p * dimension
+            diagonal = begin + block * size + row * rows - row * (row - 1) // 2
+            for q in range(p, n):
                 a, b = group[block, p], group[block, q]
-                if a == b:
-                    entry = dof_start[a * dimension + min(i, k)] + abs(k - i)
-                elif a < b:
-                    entry = dof_start[a * dimension + i] + dimension * rank[p, q] - i + k
-                else:
-                    entry = dof_start[b * dimension + k] + dimension * rank[q, p] - k + i
-                target[block, m] = place[entry]
-                m += 1
+                how = UPPER if p == q else AS_IT_IS if a < b else TRANSPOSED if a > b else FOLDED
+                k = at[found[block, pair]]
+                at[found[block, pair]] += 1
+                source[k] = diagonal + (q - p) * dimension
+                code[k] = 4 * (rows - row) + how
+                pair += 1
 
 
 @nb.njit(cache=True)
@@ -212,33 +241,41 @@ def _all_coupled(group, node_start, node_column):  # type: ignore[no-untyped-def
 
 
 @nb.njit(cache=True)
-def _invert(target, n_stored):  # type: ignore[no-untyped-def]
-    """Counting sort: for each stored entry, the packed entries that add up to it."""
-    start = np.zeros(n_stored + 1, np.int64)
-    for entry in target:
-        if entry >= 0:
-            start[entry + 1] += 1
-    for k in range(n_stored):
-        start[k + 1] += start[k]
-    at = start[:-1].copy()
-    source = np.empty(start[-1], np.int32)
-    for m in range(len(target)):
-        entry = target[m]
-        if entry >= 0:
-            source[at[entry]] = m
-            at[entry] += 1
-    return start, source
+def _spread(start, source, code, node_start, node_column, dof_start, d, place, n_stored):  # type: ignore[no-untyped-def]
+    """Return for each stored entry the packed ones that add up to it, in the order of the entries."""
+    begin = np.zeros(n_stored + 1, np.int64)
+    single = np.empty(d * d * len(source), np.int32)
+    at = 0
+    for a in range(len(node_start) - 1):
+        for i in range(d):
+            for m in range(node_start[a], node_start[a + 1]):
+                row = dof_start[a * d + i] + d * (m - node_start[a]) - i
+                for k in range(i if m == node_start[a] else 0, d):
+                    entry = place[row + k]
+                    if entry < 0:
+                        continue
+                    for n in range(start[m], start[m + 1]):
+                        how, width = code[n] & 3, code[n] >> 2
+                        r, c = (k, i) if how == TRANSPOSED else (i, k)
+                        # Each row of a packed triangle begins one entry earlier than the one before.
+                        single[at] = source[n] + r * width - r * (r + 1) // 2 + c
+                        at += 1
+                        if how == FOLDED and i != k:
+                            single[at] = source[n] + c * width - c * (c + 1) // 2 + r
+                            at += 1
+                    begin[entry + 1] = at
+    return begin, single[:at].copy()
 
 
 @nb.njit(cache=True, parallel=True)
-def _gather(packed, source_start, source, out):  # type: ignore[no-untyped-def]
+def _gather(packed, start, source, out):  # type: ignore[no-untyped-def]
     n_chunks = 64
     for chunk in nb.prange(n_chunks):
         for k in range(chunk * len(out) // n_chunks, (chunk + 1) * len(out) // n_chunks):
             total = 0.0
-            for m in range(source_start[k], source_start[k + 1]):
+            for m in range(start[k], start[k + 1]):
                 total += packed[source[m]]
-            out[k] = total
+            out[k] += total
 
 
 @nb.njit(cache=True, parallel=True)
