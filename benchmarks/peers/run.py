@@ -62,7 +62,8 @@ class Peer:
 
 
 PEERS = {
-    "turgor": Peer("Turgor", "with_turgor.py"),
+    "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",)),
+    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",)),
     "felupe": Peer("FElupe", "with_felupe.py", "felupe"),
     "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve"),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),

@@ -123,7 +123,7 @@ IMPOSSIBLE = {
     "rings longer than the tube": (ReinforcedTube, {"rings": 30}, "rings"),
     "fibre caps meet": (FibreTube, {"cap": "170 mm"}, "cap"),
     "fibres longer than the tube": (FibreTube, {"fibre_length": "340 mm"}, "fibre_length"),
-    "no fibre fits": (FibreTube, {"fibre_length": "0.1 mm", "pitch": "50 mm"}, "fibre_length"),
+    "no fibre fits": (FibreTube, {"tilt": "0 deg", "fibre_length": "0.1 mm", "pitch": "50 mm"}, "fibre_length"),
     "tilt too steep": (FibreTube, {"tilt": "80 deg"}, "tilt"),
     "winding unknown": (FibreTube, {"winding": "up"}, "winding"),
     "no fibre": (FibreTube, {"fibres": 0}, "fibres"),

@@ -318,7 +318,7 @@ def test_fibres_lie_on_their_helices():
     for name, curve in mesh.curves.items():
         number = int(name.split("-")[1]) - 1
         np.testing.assert_allclose(np.hypot(curve[:, 0], curve[:, 1]), radius)
-        assert ((curve[:, 2] >= low - 1e-9) & (curve[:, 2] <= low + 305 + 1e-9)).all()
+        assert ((curve[:, 2] >= -1e-9) & (curve[:, 2] <= 339.0 + 1e-9)).all()
         turn = np.unwrap(np.arctan2(curve[:, 1], curve[:, 0]))
         sense = 1 if number == 0 else -1
         assert (sense * np.diff(turn) > 0.0).all()
@@ -339,10 +339,19 @@ def test_a_standard_helix_is_one_curve_from_end_to_end():
 
 @pytest.mark.parametrize("tilt", ["0 deg", "41 deg", "61 deg"])
 @pytest.mark.parametrize("pitch", ["15 mm", "13.7 mm"])
-def test_fibres_end_in_the_planes_that_clip_them(tilt, pitch):
-    curves = actuator("fibre-tube", tilt=tilt, pitch=pitch, fibres=3, winding="both")._curves()
-    ends = np.array([curve[end, 2] for curve in curves.values() for end in (0, -1)])
-    np.testing.assert_allclose(np.minimum(np.abs(ends - 17.0), np.abs(ends - 322.0)), 0.0, atol=1e-11)
+def test_fibres_wind_all_around_their_length_and_end_over_the_caps(tilt, pitch):
+    tube = actuator("fibre-tube", tilt=tilt, pitch=pitch, fibres=3, winding="both")
+    amplitude = 8.05 * math.tan(tube.tilt)
+    curves = [curve for name, curve in tube._curves().items() if name.startswith("fibre-1")]
+    # z − x tan α is what a helix that is not tilted would have.
+    mean = np.concatenate([curve[:, 2] - math.tan(tube.tilt) * curve[:, 0] for curve in curves])
+    assert mean.min() == pytest.approx(17.0 - amplitude, abs=1e-9) or tilt == "61 deg"
+    for x in (-8.05, 8.05):
+        heights = np.concatenate([curve[np.abs(curve[:, 0] - x) < 0.05, 2] for curve in curves])
+        assert heights.min() < 17.0 + tube.pitch
+        assert heights.max() > 322.0 - tube.pitch
+    ends = np.array([curve[end, 2] for curve in tube._curves().values() for end in (0, -1)])
+    assert ((ends <= 17.0 + 1e-9) | (ends >= 322.0 - 1e-9)).all(), "no end lies over the cavity"
 
 
 def test_local_sizes_refine_where_they_are_named():

@@ -25,9 +25,10 @@ _POINTS_PER_TURN = 72
 class FibreTube(Actuator):
     """A capped tube along z from the mount at z = 0; fibres run on the surface between its layers.
 
-    Fibre k of n follows x = r cos t, y = ±r sin t, z = p t / 2π + A cos t, shifted along z by k p / n and clipped to
-    the fibre length in the middle of the tube; A = r tan α (Geer, 2019, eqs. 1–5). Where a tilted helix leaves that
-    length and enters it again, each part is a curve of its own.
+    Fibre k of n follows x = r cos t, y = ±r sin t, z = p t / 2π + A cos t, shifted along z by k p / n; A = r tan α
+    (Geer, 2019, eqs. 1–5). The fibre length in the middle of the tube is wound all around: its last loops reach up to
+    2 A beyond, over the caps, which hold the fibres' ends. Ends cut off where the cavity ends would let the wall bulge
+    there. Where a loop leaves the tube and enters it again, each part is a curve of its own.
 
     Regions ``inner-layer`` (with the caps) and ``outer-layer``; surfaces ``mount``, ``tip-face``, ``outer`` and
     ``cavity``; curves ``fibre-1``, ``fibre-2``, … (parts: ``fibre-1-2``, …); markers ``base`` and ``tip`` (centres of
@@ -41,7 +42,7 @@ class FibreTube(Actuator):
     outer_layer: PositiveLength = parameter("1.8 mm", "thickness outside the fibres", _THESIS)
     length: PositiveLength = parameter("339 mm", "length, caps included", _THESIS)
     cap: PositiveLength = parameter("17 mm", "thickness of either end cap", _THESIS)
-    fibre_length: PositiveLength = parameter("305 mm", "part of the length that has fibres", _THESIS)
+    fibre_length: PositiveLength = parameter("305 mm", "part of the length that is wound all around", _THESIS)
     fibres: int = parameter(2, "number of fibres", _THESIS, ge=1, le=64)
     pitch: PositiveLength = parameter("15 mm", "rise of a fibre in one turn", "assumed: the thesis prints none")
     tilt: Angle = parameter("51 deg", "tilt of the helix; 0 is a standard one", f"{_THESIS}: 41, 51 and 61 deg")
@@ -167,24 +168,21 @@ class FibreTube(Actuator):
         return curves
 
     def _parts(self, number: int, sense: int) -> list[FloatArray]:
-        """Return the parts of one fibre inside its length, the longest first."""
+        """Return the parts of one fibre inside the tube, the longest first."""
         radius, amplitude = self.fibre_radius, self.fibre_radius * math.tan(self.tilt)
         low = 0.5 * (self.length - self.fibre_length)
-        shift = self.pitch * number / self.fibres
-        first = math.floor((-amplitude - shift) / self.pitch)
-        last = math.ceil((self.fibre_length + amplitude - shift) / self.pitch)
-        turn = 2.0 * math.pi * np.linspace(first, last, (last - first) * _POINTS_PER_TURN + 1)
+        start = low + self.pitch * number / self.fibres
+        # The mean line begins A before the fibre length, so that the upper side of the first loop begins with it.
+        reach = (low - amplitude - start) / self.pitch, (low + self.fibre_length + amplitude - start) / self.pitch
+        turn = 2.0 * math.pi * np.linspace(*reach, math.ceil((reach[1] - reach[0]) * _POINTS_PER_TURN) + 1)
 
         def height(angle: FloatArray) -> FloatArray:
-            rise: FloatArray = self.pitch * angle / (2.0 * math.pi) + amplitude * np.cos(angle) + shift
+            rise: FloatArray = start + self.pitch * angle / (2.0 * math.pi) + amplitude * np.cos(angle)
             return rise
 
-        parts = [part for part in _spans(turn, height, self.fibre_length) if len(part) > 2]
+        parts = [part for part in _spans(turn, height, self.length) if len(part) > 2]
         parts.sort(key=len, reverse=True)
-        return [
-            np.column_stack([radius * np.cos(part), sense * radius * np.sin(part), low + height(part)])
-            for part in parts
-        ]
+        return [np.column_stack([radius * np.cos(part), sense * radius * np.sin(part), height(part)]) for part in parts]
 
 
 def _spans(turn: FloatArray, height: Callable[[FloatArray], FloatArray], length: float) -> list[FloatArray]:
