@@ -8,11 +8,12 @@ the memory that goes by: it need not be more accurate than the cycle.
 
 from __future__ import annotations
 
+import numba as nb
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import jit
+from turgor.fem.kernels import CHUNKS, parallel
 from turgor.fem.pattern import SparsePattern
 from turgor.mesh.cells import body_cell
 from turgor.solver.blocks import BlockRows, invert_diagonal, multiply, sweep_backward, sweep_forward
@@ -130,7 +131,7 @@ def _upper(start: NDArray[np.int64], column: Ints) -> sp.csr_matrix:
     return upper
 
 
-@jit
+@parallel
 def _project(  # type: ignore[no-untyped-def]
     start,
     column,
@@ -149,24 +150,25 @@ def _project(  # type: ignore[no-untyped-def]
 ):
     """Add the Galerkin product ``Pᵀ A P`` of block rows, free components only, to the coarse block rows `out`."""
     n = len(coarse_start) - 1
-    place = np.empty(n, np.int64)
-    block = np.empty((3, 3))
-    for row in range(n):
-        width = 3 * (coarse_start[row + 1] - coarse_start[row])
-        for m in range(coarse_start[row], coarse_start[row + 1]):
-            place[coarse_column[m]] = 9 * coarse_start[row] + 3 * (m - coarse_start[row])
-        for child in range(down_start[row], down_start[row + 1]):
-            a = down_column[child]
-            fine_width = 3 * (start[a + 1] - start[a])
-            for m in range(start[a], start[a + 1]):
-                b = column[m]
-                at = 9 * start[a] + 3 * (m - start[a])
-                for i in range(3):
-                    for k in range(3):
-                        block[i, k] = down[child] * free[a, i] * free[b, k] * values[at + i * fine_width + k]
-                for parent in range(up_start[b], up_start[b + 1]):
-                    to = place[up_column[parent]]
+    for chunk in nb.prange(CHUNKS):
+        place = np.empty(n, np.int64)
+        block = np.empty((3, 3))
+        for row in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            width = 3 * (coarse_start[row + 1] - coarse_start[row])
+            for m in range(coarse_start[row], coarse_start[row + 1]):
+                place[coarse_column[m]] = 9 * coarse_start[row] + 3 * (m - coarse_start[row])
+            for child in range(down_start[row], down_start[row + 1]):
+                a = down_column[child]
+                fine_width = 3 * (start[a + 1] - start[a])
+                for m in range(start[a], start[a + 1]):
+                    b = column[m]
+                    at = 9 * start[a] + 3 * (m - start[a])
                     for i in range(3):
                         for k in range(3):
-                            weight = up[parent] * coarse_free[row, i] * coarse_free[up_column[parent], k]
-                            out[to + i * width + k] += weight * block[i, k]
+                            block[i, k] = down[child] * free[a, i] * free[b, k] * values[at + i * fine_width + k]
+                    for parent in range(up_start[b], up_start[b + 1]):
+                        to = place[up_column[parent]]
+                        for i in range(3):
+                            for k in range(3):
+                                weight = up[parent] * coarse_free[row, i] * coarse_free[up_column[parent], k]
+                                out[to + i * width + k] += weight * block[i, k]
