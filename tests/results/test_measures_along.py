@@ -60,6 +60,16 @@ def test_a_helix_has_its_curvature_torsion_radius_and_pitch(pitch: float, by: st
     assert found == pytest.approx([radius, pitch, LENGTH / math.hypot(radius, rise) / (2.0 * math.pi)], rel=1e-3)
 
 
+@pytest.mark.parametrize("pitch", [40.0, -45.0])
+def test_whole_turns_of_a_coil_are_not_counted_as_bending(pitch: float) -> None:
+    radius, rise = 9.0, pitch / (2.0 * math.pi)
+    length = math.hypot(radius, rise)
+    # Between the tangents (−r sin φ, r cos φ, h) / √(r² + h²) at both ends.
+    angle = math.acos((radius**2 * math.cos(LENGTH / length) + rise**2) / length**2)
+    found = measured(FINGER, helix(FINGER.mesh.points, radius, pitch), "bending_angle")
+    assert found == pytest.approx(math.degrees(angle), abs=0.5)
+
+
 def test_a_coil_does_not_depend_on_where_it_stands() -> None:
     turned = helix(FINGER.mesh.points, 9.0, 40.0) + FINGER.mesh.points
     axes = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]

@@ -23,6 +23,9 @@ FloatArray = npt.NDArray[np.float64]
 
 MOUNT, TIP_FACE, CENTRELINE = "mount", "tip-face", "centreline"
 
+OUT_OF_PLANE = np.sin(np.radians(30.0))
+"""Sine of the angle by which axes may leave a plane in which the body is said to bend."""
+
 SLICES = 32
 """Slices between the mount and the tip face; a body may turn by less than 180° from one to the next."""
 
@@ -34,7 +37,8 @@ class Motion:
     Parameters
     ----------
     bending
-        Angle in rad by which the axis of the body has turned; counts on beyond π, never negative.
+        Angle in rad by which the axis of the body has turned, never negative; counts on beyond π where the body bends
+        in a plane, while that of a coil is the one between the axes of its ends.
     twist
         Rotation about the axis in rad, added up along the body; positive turns right-handed about mount → tip.
     elongation
@@ -78,7 +82,7 @@ def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
     chords = np.einsum("ij,ij->i", np.diff(after, axis=0), middle)
     arcs = chords / np.sinc(np.linalg.norm(across, axis=1) / (2.0 * math.pi))
     return Motion(
-        bending=_unwrapped_angle(carried[0], carried[-1], across.sum(axis=0)),
+        bending=_unwrapped_angle(carried, across.sum(axis=0)),
         twist=float(along.sum()),
         elongation=float(arcs.sum() - (np.diff(before, axis=0) @ axis).sum()),
     )
@@ -92,11 +96,19 @@ def seen_from_mount(mesh: Mesh, displacement: FloatArray, vector: FloatArray) ->
     return np.asarray(rotation.T @ vector)
 
 
-def _unwrapped_angle(start: FloatArray, end: FloatArray, accumulated: FloatArray) -> float:
-    """Angle from `start` to `end` about the vector `accumulated`, with as many whole turns as its length tells."""
+def _unwrapped_angle(carried: FloatArray, accumulated: FloatArray) -> float:
+    """Angle from the first to the last of the axes ``carried (k, 3)``.
+
+    Where all lie near one plane, about its normal, the direction of `accumulated`, with as many whole turns as its
+    length tells. Out of a plane whole turns mean nothing: the axes of a coil go around its own.
+    """
+    start, end = carried[0], carried[-1]
     normal = np.cross(start, end)
+    size = float(np.linalg.norm(accumulated))
+    if size == 0.0 or np.abs(carried @ accumulated).max() > OUT_OF_PLANE * size:
+        return math.atan2(float(np.linalg.norm(normal)), float(start @ end))
     angle = math.copysign(math.atan2(float(np.linalg.norm(normal)), float(start @ end)), float(normal @ accumulated))
-    whole_turns = round((float(np.linalg.norm(accumulated)) - angle) / (2.0 * math.pi))
+    whole_turns = round((size - angle) / (2.0 * math.pi))
     return abs(angle + 2.0 * math.pi * whole_turns)
 
 

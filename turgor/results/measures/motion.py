@@ -21,7 +21,7 @@ _AXES = "xyz"
 
 @measure("bending_angle_deg", surfaces=(MOUNT, TIP_FACE), models=("space", "plane"), by_default=True)
 def bending_angle(state: StoredState) -> float:
-    """Angle in rad by which the tip face has turned against the mount; it counts on beyond 180°."""
+    """Angle in rad by which the tip face's axis has turned against the mount; in a plane it counts on beyond 180°."""
     return motion(state.mesh, state.displacement).bending
 
 
