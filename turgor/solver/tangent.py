@@ -151,9 +151,10 @@ class Tangent:
     def solved_again(self, state: State, fraction: float) -> Step | None:
         """Return the step from a later state to where this tangent solves its mixed problem.
 
-        ``None`` where it is not much shorter than the last one: a new tangent will get on faster.
+        ``None`` where it is not much shorter than the last one, or surfaces touch, which meet with their actual forces:
+        a new tangent will get on faster.
         """
-        if self._uses == USES or not self.linear.serves_again:
+        if self._uses == USES or not self.linear.serves_again or self.system.contact_force(state) > 0.0:
             return None
         self._uses += 1
         found = self._solve(-self.system.mixed_force(state, self.state))
