@@ -70,3 +70,9 @@ def test_the_drawing_fills_its_picture(name, tmp_path):
 def test_a_drawing_is_a_png_of_a_template(tmp_path):
     with pytest.raises(InputError, match=r"saved as \.png"):
         save_drawing(actuator("tube"), tmp_path / "tube.pdf")
+
+
+@pytest.mark.parametrize(("tilt", "shown"), [("51 deg", "51°"), ("0.5 rad", "28.6479°"), ("0 deg", "0°")])
+def test_angles_are_shown_in_degrees(tilt, shown):
+    values = actuator("fibre-tube", tilt=tilt).shown()
+    assert (values["tilt"], values["pitch"], values["fibres"]) == (shown, "15", "2")

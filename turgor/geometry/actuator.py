@@ -138,7 +138,7 @@ class Actuator(BaseModel, ABC):
         values: dict[str, str] = {}
         for name, text in self.model_dump(mode="json").items():
             value = getattr(self, name)
-            angle = isinstance(text, str) and text.endswith(" rad")
+            angle = isinstance(text, str) and text.endswith((" rad", " deg"))
             values[name] = (
                 f"{math.degrees(value):g}°" if angle else f"{value:g}" if isinstance(value, float) else str(value)
             )
