@@ -86,6 +86,22 @@ def test_patch_of_uniform_stress_across_meshes_that_do_not_match(section, kind, 
     assert np.sqrt(np.mean((stress - mean) ** 2)) < 1e-2 * abs(mean[1])
 
 
+def test_contact_is_made_stiffer_where_only_the_independent_look_sees_too_much(monkeypatch):
+    low, high = rectangle((1.0, 0.5), (3, 1), "quad9"), rectangle((1.0, 0.5), (4, 2), "quad9")
+    mesh = merged(low=low, high=shifted_mesh(high, y=0.5))
+    supports = [Sliding("low-x0"), Sliding("high-x0"), Sliding("low-y0"), Prescribed("high-y1", (None, -0.1))]
+    system = System(mesh, {"body": neo_hookean(1.0, 5.0)}, supports, section=PlaneStrain(), contact=[SelfContact()])
+    plain = solve_path(system, [1.0])[0].state
+    assert not system.seen_to_overlap(plain)
+    looks = []
+    monkeypatch.setattr(system, "seen_to_overlap", lambda state: looks.append(state) or True)
+    stiffer = solve_path(system, [1.0])[0].state
+    assert len(looks) == 2, "an end is put to it"
+    assert stiffer.penalty >= 4.0 * plain.penalty
+    overlap, before = (system.touches(state)[0].overlap for state in (stiffer, plain))
+    assert overlap < 0.5 * before
+
+
 def hairpin(bend: float, wall: float, arm: float, n: int) -> Mesh:
     """A strip bent into a hairpin, arms along x; surfaces ``low`` (the end of one), ``outer`` and ``inner``."""
     strip = rectangle((1.0, 1.0), (10 * n, n))

@@ -292,6 +292,10 @@ class System:
         """Return the part of Newton's step `du`, at most 1, up to which no surfaces overlap too far to be seen."""
         return min((contact.longest_step(state, du) for contact in self.contacts), default=1.0)
 
+    def seen_to_overlap(self, state: State) -> bool:
+        """Whether an independent look finds surfaces that overlap more than is allowed; no where it is not possible."""
+        return any(contact.intersects(state) is True for contact in self.contacts)
+
     def touches(self, state: State) -> list[Touch]:
         """Return how each contact stands."""
         return [contact.touch(state) for contact in self.contacts]

@@ -48,6 +48,9 @@ LONGEST_REACH = 2.0
 STIFFER = 6
 """How often contact is made stiffer before one equilibrium is given up."""
 
+LOOKS = 2
+"""How often for what is only seen by the independent look, between the points at which contact acts."""
+
 LAGS = 25
 """How often an equilibrium is found again with the forces of friction that it shows, before it is given up."""
 
@@ -316,12 +319,13 @@ class _Walk:
         if self.system.rubs:
             guess = replace(guess, grips=self.system.gripped(self.here.state, dragged=True).grips)
         found = self._found(aim, guess)
-        for _ in range(STIFFER):
+        for attempt in range(STIFFER):
             overlap = _overlap(self.system, found.state)
-            if overlap <= LARGEST_OVERLAP:
+            seen = 0.0 < overlap <= LARGEST_OVERLAP and attempt < LOOKS and self.system.seen_to_overlap(found.state)
+            if overlap <= LARGEST_OVERLAP and not seen:
                 return found
             penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
-            log.info("overlap of %.2g of the wall: contact made stiffer, factor %.3g", overlap, penalty)
+            log.info("overlap of %.2g of the wall or more: contact made stiffer, factor %.3g", overlap, penalty)
             self._tally.count(found)
             found = self._found(aim, replace(found.state, penalty=penalty))
         raise NotConvergedError(
