@@ -87,7 +87,9 @@ class SparsePattern:
 
     def add_blocks(self, nodes: Ints, packed: Floats, out: Floats) -> None:
         """Add packed blocks ``(n_blocks, packed)`` that the pattern covers to the stored values `out`."""
-        _gather(packed.ravel(), *self._sources_of([nodes]), out)
+        node_start, node_column, dof_start, dimension, place = self._places
+        pairs = _find_pairs(nodes, node_start, node_column)
+        _add(nodes, pairs, packed, node_start, dof_start, dimension, place, out)
 
     def graph(self) -> sp.csr_matrix:
         """Return which nodes are coupled, both ways, ``(n_nodes, n_nodes)``.
@@ -127,8 +129,8 @@ class SparsePattern:
         for group, found in zip(groups, pairs, strict=True):
             _list_sources(group, found, begin, dimension, at, source, code)
             begin += len(group) * packed_size(group.shape[1] * dimension)
-        begin, single = _spread(start, source, code, *self._places, self.n_stored)
-        return begin, single
+        first, single = _spread(start, source, code, *self._places, self.n_stored)
+        return first, single
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
@@ -265,6 +267,27 @@ def _spread(start, source, code, node_start, node_column, dof_start, d, place, n
                             at += 1
                     begin[entry + 1] = at
     return begin, single[:at].copy()
+
+
+@nb.njit(cache=True)
+def _add(group, found, packed, node_start, dof_start, d, place, out):  # type: ignore[no-untyped-def]
+    """Add packed blocks to the stored values, entry by entry: for few of them no list is worth while."""
+    n = group.shape[1]
+    for block in range(len(group)):
+        m = 0
+        for row in range(n * d):
+            p, i = row // d, row % d
+            for col in range(row, n * d):
+                q, k = col // d, col % d
+                a, b = group[block, p], group[block, q]
+                # Of the two nodes the earlier one has the row; at a single node the lower component has it.
+                r, c = (k, i) if a > b or (a == b and i > k) else (i, k)
+                low = min(a, b)
+                rank = found[block, p * n - p * (p - 1) // 2 + q - p] - node_start[low]
+                entry = place[dof_start[low * d + r] + d * rank - r + c]
+                if entry >= 0:
+                    out[entry] += packed[block, m]
+                m += 1
 
 
 @nb.njit(cache=True, parallel=True)
