@@ -144,6 +144,7 @@ def linear_changes(du, cells, F, G, dV, modes, tangent, dilatation, stress):  # 
         inv = np.empty((3, 3))
         spatial = np.empty((3, 3))
         strain = np.empty(6)
+        change = np.empty(6)
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
             gather(du, cells[e], local)
             dilatation[e] = 0.0
@@ -161,49 +162,38 @@ def linear_changes(du, cells, F, G, dV, modes, tangent, dilatation, stress):  # 
                         strain[SYM[i, j]] = spatial[i, i] if i == j else spatial[i, j] + spatial[j, i]
                 for k in range(modes.shape[2]):
                     dilatation[e, k] += modes[e, q, k] * weight * (strain[0] + strain[1] + strain[2])
-                for i in range(3):
-                    for j in range(i, 3):
-                        value = 0.0
-                        for r in range(6):
-                            value += tangent[e, q, PACK[SYM[i, j], r]] * strain[r]
-                        spatial[i, j] = value
-                        spatial[j, i] = value
-                sandwich(inv, spatial, stress[e, q])
+                for s in range(6):
+                    change[s] = 0.0
+                    for r in range(6):
+                        change[s] += tangent[e, q, PACK[s, r]] * strain[r]
+                sandwich(inv, change, stress[e, q])
 
 
 @parallel
 def pulled_back(F, tau, out):  # type: ignore[no-untyped-def]
     """Fill ``out (m, q, 6)`` with the second Piola–Kirchhoff stress ``F⁻¹ τ F⁻ᵀ``, ``F (m, q, 3, 3)``."""
     for e in nb.prange(len(F)):
-        full = np.empty((3, 3))
         inv = np.empty((3, 3))
         for q in range(F.shape[1]):
             inverse(F[e, q], inv)
-            for i in range(3):
-                for j in range(3):
-                    full[i, j] = tau[e, q, SYM[i, j]]
-            sandwich(inv, full, out[e, q])
+            sandwich(inv, tau[e, q], out[e, q])
 
 
 @parallel
 def transformed(A, B, out):  # type: ignore[no-untyped-def]
     """Fill ``out (m, q, 6)`` with the symmetric tensors ``A B Aᵀ``, ``A (m, q, 3, 3)`` and ``B (m, q, 6)``."""
     for e in nb.prange(len(A)):
-        full = np.empty((3, 3))
         for q in range(A.shape[1]):
-            for i in range(3):
-                for j in range(3):
-                    full[i, j] = B[e, q, SYM[i, j]]
-            sandwich(A[e, q], full, out[e, q])
+            sandwich(A[e, q], B[e, q], out[e, q])
 
 
 @inlined
 def sandwich(A, B, out):  # type: ignore[no-untyped-def]
-    """Write the symmetric tensor ``A B Aᵀ`` of ``A, B (3, 3)`` into ``out (6,)``."""
+    """Write the symmetric tensor ``A B Aᵀ`` of ``A (3, 3)`` and ``B (6,)`` into ``out (6,)``."""
     half = np.empty(3)
     for i in range(3):
         for k in range(3):
-            half[k] = A[i, 0] * B[0, k] + A[i, 1] * B[1, k] + A[i, 2] * B[2, k]
+            half[k] = A[i, 0] * B[SYM[0, k]] + A[i, 1] * B[SYM[1, k]] + A[i, 2] * B[SYM[2, k]]
         for j in range(i, 3):
             out[SYM[i, j]] = half[0] * A[j, 0] + half[1] * A[j, 1] + half[2] * A[j, 2]
 

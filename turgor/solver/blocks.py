@@ -16,7 +16,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import CHUNKS, jit, parallel
+from turgor.fem.kernels import CHUNKS, inverse, jit, parallel
 from turgor.fem.pattern import SparsePattern
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ def multiply(start, column, values, x, out):  # type: ignore[no-untyped-def]
 
 
 @parallel
-def sweep_forward(start, column, diagonal, bounds, values, inverse, right, x, odd):  # type: ignore[no-untyped-def]
+def sweep_forward(start, column, diagonal, bounds, values, inverses, right, x, odd):  # type: ignore[no-untyped-def]
     """Go forward by Gauss–Seidel through the portions of even or odd number; first the even ones, from zero."""
     for half in nb.prange((len(bounds) - odd) // 2):
         near = np.empty(widest(start), x.dtype)
@@ -111,11 +111,11 @@ def sweep_forward(start, column, diagonal, bounds, values, inverse, right, x, od
                 done = row_product(start, values, a, i, first - start[a], last - start[a], near)
                 rest[i] = right[3 * a + i] - done
             for i in range(3):
-                x[3 * a + i] = inverse[a, i, 0] * rest[0] + inverse[a, i, 1] * rest[1] + inverse[a, i, 2] * rest[2]
+                x[3 * a + i] = inverses[a, i, 0] * rest[0] + inverses[a, i, 1] * rest[1] + inverses[a, i, 2] * rest[2]
 
 
 @parallel
-def sweep_backward(start, column, bounds, values, inverse, right, x, odd):  # type: ignore[no-untyped-def]
+def sweep_backward(start, column, bounds, values, inverses, right, x, odd):  # type: ignore[no-untyped-def]
     """Go backward by Gauss–Seidel through the portions of even or odd number; first the odd ones."""
     for half in nb.prange((len(bounds) - odd) // 2):
         near = np.empty(widest(start), x.dtype)
@@ -126,7 +126,7 @@ def sweep_backward(start, column, bounds, values, inverse, right, x, odd):  # ty
                 done = row_product(start, values, a, i, 0, start[a + 1] - start[a], near)
                 rest[i] = right[3 * a + i] - done
             for i in range(3):
-                x[3 * a + i] += inverse[a, i, 0] * rest[0] + inverse[a, i, 1] * rest[1] + inverse[a, i, 2] * rest[2]
+                x[3 * a + i] += inverses[a, i, 0] * rest[0] + inverses[a, i, 1] * rest[1] + inverses[a, i, 2] * rest[2]
 
 
 @jit
@@ -158,8 +158,8 @@ def row_product(start, values, a, i, first, last, near):  # type: ignore[no-unty
 
 
 @parallel
-def invert_diagonal(start, diagonal, values, inverse):  # type: ignore[no-untyped-def]
-    """Fill ``inverse (n, 3, 3)`` with those of the diagonal blocks.
+def invert_diagonal(start, diagonal, values, inverses):  # type: ignore[no-untyped-def]
+    """Fill ``inverses (n, 3, 3)`` with those of the diagonal blocks.
 
     Of a block that is not positive definite it is that of the sizes of its diagonal entries, so that the smoother
     stays definite.
@@ -171,16 +171,9 @@ def invert_diagonal(start, diagonal, values, inverse):  # type: ignore[no-untype
             for k in range(3):
                 d[i, k] = values[begin + i * width + k]
         minor = d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0]
-        c0 = d[1, 1] * d[2, 2] - d[1, 2] * d[2, 1]
-        c1 = d[1, 2] * d[2, 0] - d[1, 0] * d[2, 2]
-        c2 = d[1, 0] * d[2, 1] - d[1, 1] * d[2, 0]
-        determinant = d[0, 0] * c0 + d[0, 1] * c1 + d[0, 2] * c2
-        if d[0, 0] > 0.0 and minor > 0.0 and determinant > 0.0:
+        determinant = inverse(d, inverses[a])
+        if not (d[0, 0] > 0.0 and minor > 0.0 and determinant > 0.0):
+            inverses[a] = 0.0
             for i in range(3):
-                for k in range(3):
-                    p, q, r, s = (k + 1) % 3, (k + 2) % 3, (i + 1) % 3, (i + 2) % 3
-                    inverse[a, i, k] = (d[p, r] * d[q, s] - d[p, s] * d[q, r]) / determinant
-        else:
-            for i in range(3):
-                for k in range(3):
-                    inverse[a, i, k] = 1.0 / abs(d[i, i]) if i == k and d[i, i] != 0.0 else 0.0
+                if d[i, i] != 0.0:
+                    inverses[a, i, i] = 1.0 / abs(d[i, i])
