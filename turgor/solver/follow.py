@@ -222,8 +222,7 @@ class _Arc:
             if part > 0.0:
                 aim = here.fraction + part * reach * (here.fraction - before.fraction)
         control = ArcLength(walk.measure(here), here.fraction, self.scale, 1.0, length, walk.quantity.weights)
-        found = find_equilibrium(walk.system, walk.linear, guess, aim, walk.options, control=control)
-        return found if found.compliance is not None else walk.with_compliance(found)
+        return find_equilibrium(walk.system, walk.linear, guess, aim, walk.options, control=control)
 
     def _way(
         self, to: Equilibrium, since: Equilibrium | None = None

@@ -150,9 +150,7 @@ class VolumeWalk:
             reach = (value - places[-1]) / (places[-1] - places[-2])
             fraction += part * reach * (fraction - known[-2].fraction)
         control = self.quantity.fixed(value)
-        found = find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
-        # A prediction that needed no iteration has not been asked for its compliance yet.
-        return found if found.compliance is not None else self.with_compliance(found)
+        return find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between the last two equilibria of the walk, whose compliances differ in sign.
