@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from turgor.common.optional import is_available, require
 from turgor.fem.contact.facets import Facets
+from turgor.fem.contact.recent import Recent
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.mesh.mesh import in_space
@@ -37,6 +38,8 @@ class IntersectionCheck:
         allowed = np.repeat(0.5 * LARGEST_OVERLAP * skin.wall, facets.number.shape[1])
         np.minimum.at(depth, facets.number.ravel(), allowed)
         self._depth = depth
+        # It is asked when a state is accepted, and once more when that is stored.
+        self._recent = Recent(self._look)
 
     @staticmethod
     def is_possible() -> bool:
@@ -51,6 +54,9 @@ class IntersectionCheck:
         MissingPackageError
             If the IPC Toolkit is not installed.
         """
+        return self._recent(u)
+
+    def _look(self, u: Floats) -> bool:
         x = in_space(self.facets.places(u))
         x += self._depth[:, None] * self._inward(x)
         x = np.asfortranarray(x[:, : self.skin.dimension])
