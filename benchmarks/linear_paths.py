@@ -23,18 +23,17 @@ import numpy as np
 from turgor.fem.loads import Pressure
 from turgor.fem.supports import Clamped
 from turgor.fem.system import System
-from turgor.geometry.tube import CappedTube
 from turgor.materials.models.neo_hookean import NeoHookean
 from turgor.materials.volumetric import Quadratic
-from turgor.mesh.generate import generate
 from turgor.mesh.mesh import Mesh
 from turgor.solver import iterative
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.newton import NewtonOptions, find_equilibrium
 
 sys.path.insert(0, str(Path(__file__).parent / "peers"))
-from case_t import MU, PRESSURE
+from case_t import MU, PRESSURE, TubeMesh
 from measure import cpu_s, peak_memory_MB
+from with_turgor import body_of, tube_mesh
 
 PATHS = ("direct", "iterative")
 WARM_UP = 6.0
@@ -44,20 +43,10 @@ HEAD = """\
 
 
 def saved(size: float, folder: Path) -> Path:
-    """Mesh the tube at an element size in mm and store what a run needs."""
-    mesh = generate(CappedTube(), size)
+    """Mesh the tube at an element size in mm and store it."""
     path = folder / f"{size}.npz"
-    surfaces = {name: mesh.surface(name) for name in ("mount", "cavity")}
-    np.savez(path, points=mesh.points, cells=mesh.cells, **surfaces)
+    tube_mesh(size).save(path)
     return path
-
-
-def loaded(path: Path) -> Mesh:
-    """Read it again."""
-    with np.load(path) as stored:
-        points, cells, mount, cavity = (stored[name] for name in ("points", "cells", "mount", "cavity"))
-    regions = {"body": np.arange(len(cells), dtype=np.int32)}
-    return Mesh(points, cells, regions, {"mount": mount, "cavity": cavity}, {}, {})
 
 
 def solve(mesh: Mesh, path: str, ratio: float) -> dict[str, object]:
@@ -78,8 +67,8 @@ def solve(mesh: Mesh, path: str, ratio: float) -> dict[str, object]:
 def worker(path: str, ratio: float, augmentation: float, warm_up: Path, mesh: Path) -> None:
     """Run one path on one mesh and print one line of JSON."""
     iterative.AUGMENTATION = augmentation
-    solve(loaded(warm_up), path, ratio)
-    body = loaded(mesh)
+    solve(body_of(TubeMesh.load(warm_up)), path, ratio)
+    body = body_of(TubeMesh.load(mesh))
 
     wall, cpu = time.perf_counter(), cpu_s()
     found = solve(body, path, ratio)

@@ -77,7 +77,7 @@ def system_of(case: Case, mesh: Mesh, target: float) -> System:
     """Return the actuator held at its mount and symmetry planes, the target pressure in every cavity."""
     body, second = (get(name) for name in case.materials)
     materials = {region: body if region == "body" else second for region in mesh.regions}
-    planes = [Sliding(name) for name in mesh.surfaces if name.startswith("symmetry")]
+    planes = [Sliding(name) for name in mesh.symmetry_planes]
     cavities = [name for name in mesh.surfaces if name == "cavity" or name.startswith("cavity-")]
     return System(mesh, materials, [Clamped("mount"), *planes], [Pressure(name, target) for name in cavities])
 

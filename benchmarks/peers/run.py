@@ -21,8 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from case_t import TubeMesh
-
-import turgor
+from with_turgor import tube_mesh
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"
@@ -101,11 +100,9 @@ def main() -> None:
 
 
 def export(size: float) -> Path:
-    """Mesh case T with Turgor's mesher and write it as plain arrays."""
+    """Mesh case T and write it as plain arrays."""
     path = RESULTS / f"case-t-{size:g}mm.npz"
-    mesh = turgor.CappedTube().mesh(size=f"{size} mm")
-    tip = int(mesh.markers["tip"][0])
-    TubeMesh(mesh.points, mesh.cells, mesh.surfaces["mount"], mesh.surfaces["cavity"], tip).save(path)
+    tube_mesh(size).save(path)
     return path
 
 

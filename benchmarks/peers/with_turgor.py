@@ -23,8 +23,16 @@ from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, solve_path
 
 
-def solve(tube: TubeMesh) -> Solved:
-    mesh = Mesh(
+def tube_mesh(size: float) -> TubeMesh:
+    """Mesh case T with Turgor's mesher at an element size in mm."""
+    mesh = turgor.CappedTube().mesh(size=f"{size} mm")
+    tip = int(mesh.markers["tip"][0])
+    return TubeMesh(mesh.points, mesh.cells, mesh.surfaces["mount"], mesh.surfaces["cavity"], tip)
+
+
+def body_of(tube: TubeMesh) -> Mesh:
+    """Return the tube as a mesh of Turgor's."""
+    return Mesh(
         points=tube.points,
         cells=tube.cells,
         regions={"body": np.arange(len(tube.cells), dtype=np.int32)},
@@ -32,6 +40,10 @@ def solve(tube: TubeMesh) -> Solved:
         markers={},
         curves={},
     )
+
+
+def solve(tube: TubeMesh) -> Solved:
+    mesh = body_of(tube)
     rubber = create("neo-hookean", {"C10": f"{MU / 2} MPa"}, bulk_modulus=f"{BULK} MPa")
     system = System(mesh, {"body": rubber}, [Clamped("mount")], [Pressure("cavity", PRESSURE)])
     way = sys.argv[3]
