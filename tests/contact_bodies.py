@@ -39,14 +39,14 @@ def geometric(first: float, n: int, length: float) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(first * factor ** np.arange(n))])
 
 
-def half_chamber(lengths: tuple[float, float, float], divisions: tuple[int, int, int]) -> Mesh:
+def half_chamber(lengths: tuple[float, float, float], divisions: tuple[int, int, int], kind: str = "tet10") -> Mesh:
     """The half y ≥ 0 of a hollow box with walls one cell thick; surfaces ``cavity y0 z0 x0 x1``."""
-    grid = box(lengths, divisions)
+    grid = box(lengths, divisions, kind)
     size = np.array(lengths) / divisions
-    middle = grid.points[grid.cells[:, :4]].mean(axis=1)
+    middle = grid.points[grid.cells[:, : grid.cell.n_corners]].mean(axis=1)
     air = (middle[:, [0, 2]] > size[[0, 2]]).all(axis=1) & (middle < np.array(lengths) - size).all(axis=1)
     used, cells = np.unique(grid.cells[~air], return_inverse=True)
-    cells, points = cells.reshape(-1, 10).astype(np.int32), grid.points[used]
+    cells, points = cells.reshape(-1, grid.cells.shape[1]).astype(np.int32), grid.points[used]
     faces = boundary_faces(cells)
     ends = {f"{'xyz'[axis]}{k}": (axis, k * lengths[axis]) for axis in range(3) for k in (0, 1)}
     sides = {name: (points[faces][:, :, axis] == at).all(axis=1) for name, (axis, at) in ends.items()}

@@ -20,11 +20,14 @@ from turgor.mesh.generate import generate
 from turgor.mesh.structured import box
 from turgor.solver.path import output_fractions, solve_path
 
+KINDS = ["tet10", "hex27"]
 
-def test_hertz_cylinder_on_a_half_space():
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_hertz_cylinder_on_a_half_space(kind):
     # Line contact (Hertz 1882): b² = 4 F' R/(π E*), p0² = F' E*/(π R), p = p0 √(1 − x²/b²).
     radius, depth, length, n = 25.0, 0.1, 12.0, 16
-    mesh = box((1.0, 0.25, 1.0), (n, 1, n))
+    mesh = box((1.0, 0.25, 1.0), (n, 1, n), kind)
     places = geometric(0.12, n, length)
     mesh = graded(graded(mesh, 0, n, places), 2, n, length - places[::-1])
     mu, bulk = 1.0, 2.0
@@ -44,8 +47,8 @@ def test_hertz_cylinder_on_a_half_space():
     inside = x < 0.9 * half_width
     assert inside.sum() > 60
     slope, square = np.polyfit(x[inside] ** 2, pressure[inside] ** 2, 1)
-    assert np.sqrt(square) == pytest.approx(peak, rel=0.03)
-    assert np.sqrt(-square / slope) == pytest.approx(half_width, rel=0.03)
+    assert np.sqrt(square) == pytest.approx(peak, rel=0.01)
+    assert np.sqrt(-square / slope) == pytest.approx(half_width, rel=0.015)
 
 
 def contact_pressure(term, state):
@@ -56,9 +59,10 @@ def contact_pressure(term, state):
     return x[..., 0].ravel(), -(stiffness * term.lagged_at(state.u, state.loads)).ravel()
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("contact", [SelfContact(), PairContact("low-z1", "high-z0")])
-def test_patch_of_uniform_stress_across_meshes_that_do_not_match(contact):
-    low, high = box((1.0, 1.0, 0.5), (2, 3, 1)), box((1.0, 1.0, 0.5), (3, 2, 2))
+def test_patch_of_uniform_stress_across_meshes_that_do_not_match(contact, kind):
+    low, high = box((1.0, 1.0, 0.5), (2, 3, 1), kind), box((1.0, 1.0, 0.5), (3, 2, 2), kind)
     mesh = merged(low=low, high=shifted_mesh(high, z=0.5))
     supports = [Sliding(f"{part}-{side}") for part in ("low", "high") for side in ("x0", "y0")]
     supports += [Sliding("low-z0"), Prescribed("high-z1", (None, None, -0.1))]
@@ -68,24 +72,24 @@ def test_patch_of_uniform_stress_across_meshes_that_do_not_match(contact):
     mean = stress.reshape(-1, 6).mean(axis=0)
     assert mean[2] < -0.2
     assert np.abs(mean[[0, 1, 3, 4, 5]]).max() < 2e-3 * abs(mean[2])
-    assert np.sqrt(np.mean((stress - mean) ** 2)) < 1e-2 * abs(mean[2])
-    assert np.abs(stress - mean).max() < 0.05 * abs(mean[2])
+    assert np.sqrt(np.mean((stress - mean) ** 2)) < 2e-3 * abs(mean[2])
+    assert np.abs(stress - mean).max() < 0.02 * abs(mean[2])
 
 
-def chambers(pressure: float, contact) -> System:
+def chambers(pressure: float, contact, kind: str = "tet10") -> System:
     """Two pressurised boxes 1 mm apart, halves y ≥ 0 of them, standing on their floor."""
-    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6))
+    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6), kind)
     mesh = merged(left=one, right=shifted_mesh(one, 13.0))
     supports = [Clamped("left-z0"), Clamped("right-z0"), Sliding("left-y0"), Sliding("right-y0")]
     loads = [Pressure("left-cavity", pressure), Pressure("right-cavity", pressure)]
     return System(mesh, {"body": neo_hookean(0.1, 1000.0)}, supports, loads, contact=contact)
 
 
-@pytest.mark.parametrize("steps", [1, 4])
-def test_walls_of_pressurised_chambers_meet_and_do_not_pass(steps):
-    free = chambers(0.03, ())
+@pytest.mark.parametrize(("steps", "kind"), [(1, "tet10"), (4, "tet10"), (4, "hex27")])
+def test_walls_of_pressurised_chambers_meet_and_do_not_pass(steps, kind):
+    free = chambers(0.03, (), kind)
     found = solve_path(free, [1.0])[0]
-    system = chambers(0.03, [SelfContact()])
+    system = chambers(0.03, [SelfContact()], kind)
     check = system.contacts[0].intersection_check
     assert check.intersects(found.state.u)
     equilibria = solve_path(system, output_fractions(steps))
@@ -101,6 +105,28 @@ def test_walls_of_pressurised_chambers_meet_and_do_not_pass(steps):
     x = system.mesh.points + equilibria[-1].state.u
     assert x[left, 0].max() == pytest.approx(12.5, abs=0.05)
     assert x[right, 0].min() == pytest.approx(12.5, abs=0.05)
+
+
+def test_a_chamber_under_vacuum_closes_on_itself():
+    # Flat, held at both ends: floor and roof meet in the middle of the height, found by nothing but the search.
+    mesh = half_chamber((12.0, 6.0, 4.0), (8, 4, 4), "hex27")
+    supports, vacuum = [Clamped("x0"), Clamped("x1"), Sliding("y0")], [Pressure("cavity", -0.01)]
+    free, system = (
+        System(mesh, {"body": neo_hookean(0.1, 1000.0)}, supports, vacuum, contact=contact)
+        for contact in ([], [SelfContact()])
+    )
+    check = system.contacts[0].intersection_check
+    assert check.intersects(solve_path(free, [0.5, 1.0])[-1].state.u)
+    found = solve_path(system, [0.5, 1.0])[-1]
+    touch = system.touches(found.state)[0]
+    assert touch.area > 4.0
+    assert touch.overlap_per_wall < LARGEST_OVERLAP
+    assert not check.intersects(found.state.u)
+    z = (mesh.points + found.state.u)[:, 2]
+    roof, floor = z[mesh.surface_nodes("z1")].min(), z[mesh.surface_nodes("z0")].max()
+    # two walls, thinned a little, are all that lies between them
+    assert roof + floor == pytest.approx(4.0, abs=1e-6)
+    assert roof - floor == pytest.approx(2.0, rel=0.05)
 
 
 def test_walls_of_a_pneunet_meet_and_push_it_to_bend_more():
@@ -125,8 +151,9 @@ def test_walls_of_a_pneunet_meet_and_push_it_to_bend_more():
     assert angles[1] > 1.08 * angles[0] > 0.3
 
 
-def test_force_on_a_plane_is_what_the_mount_carries():
-    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6))
+@pytest.mark.parametrize("kind", KINDS)
+def test_force_on_a_plane_is_what_the_mount_carries(kind):
+    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6), kind)
     contact = [RigidContact(Plane((0.0, 0.0, 12.4), (0.0, 0.1, -1.0)), label="plate")]
     loads = [Pressure("cavity", 0.02)]
     system = System(one, {"body": neo_hookean(0.1, 1000.0)}, [Clamped("z0"), Sliding("y0")], loads, contact=contact)

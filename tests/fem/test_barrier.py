@@ -26,10 +26,10 @@ pytest.importorskip("ipctk")
 SELF, PAIR = SelfContact(method="barrier"), PairContact("low-top", "high-bottom", method="barrier")
 
 
-def stacked(case, section=None, gap=0.2) -> System:
+def stacked(case, section=None, gap=0.2, kind="tet10") -> System:
     """A small block over a larger one, meshes that do not match."""
     if section is None:
-        low, high = box((2.0, 2.0, 1.0), (2, 2, 1)), box((1.2, 1.3, 1.0), (3, 2, 1))
+        low, high = box((2.0, 2.0, 1.0), (2, 2, 1), kind), box((1.2, 1.3, 1.0), (3, 2, 1), kind)
         away, top, bottom = (0.4, 0.35, 1.0 + gap), "z1", "z0"
     else:
         low, high, away = rectangle((2.0, 1.0), (3, 2)), rectangle((1.2, 1.0), (2, 1)), (0.4, 1.0 + gap)
@@ -65,9 +65,11 @@ def check(term, state):
 
 
 @pytest.mark.parametrize("case", [SELF, PAIR], ids=["self", "pair"])
-@pytest.mark.parametrize("section", [None, PlaneStrain(2.0), Axisymmetric()])
-def test_force_and_stiffness_are_derivatives_of_the_energy(section, case):
-    system = stacked(case, section)
+@pytest.mark.parametrize(
+    ("section", "kind"), [(None, "tet10"), (None, "hex27"), (PlaneStrain(2.0), "quad9"), (Axisymmetric(), "quad9")]
+)
+def test_force_and_stiffness_are_derivatives_of_the_energy(section, kind, case):
+    system = stacked(case, section, kind=kind)
     term, state = system.contacts[0], near(system, 0.006)
     assert term.touch(system.reference_state()).gap is None
     check(term, state)
@@ -85,9 +87,10 @@ BODIES = {
 }
 
 
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
 @pytest.mark.parametrize("name", BODIES)
-def test_rigid_body_feels_what_the_skin_does(name):
-    mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
+def test_rigid_body_feels_what_the_skin_does(name, kind):
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1), kind)
     contact = [RigidContact(BODIES[name], method="barrier")]
     system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=contact)
     term = system.contacts[0]
@@ -152,8 +155,9 @@ def test_a_step_ends_before_surfaces_meet():
     assert system.contacts[0].intersects(rest.moved(0.5 * du))
 
 
-def test_nothing_pushes_at_rest_nor_through_a_wall():
-    mesh = half_chamber((6.0, 3.0, 6.0), (6, 3, 6))
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_nothing_pushes_at_rest_nor_through_a_wall(kind):
+    mesh = half_chamber((6.0, 3.0, 6.0), (6, 3, 6), kind)
     system = System(mesh, {"body": neo_hookean()}, [Clamped("z0"), Sliding("y0")], contact=[SELF])
     state = system.reference_state()
     assert system.contacts[0].energy(state) == 0.0

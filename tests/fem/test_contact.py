@@ -10,11 +10,13 @@ from samples import check_assembled, neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.pairs import balls, find_partners
+from turgor.fem.contact.shapes import second_derivatives, shape_functions
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
 from turgor.fem.rigid import Box, Cylinder, Plane, Sphere
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
+from turgor.mesh.cells import CELLS
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.structured import box, shell_octant
 
@@ -27,23 +29,28 @@ BODIES = {
 }
 
 
-def stacked(gap: float) -> System:
+KINDS = ["tet10", "hex27"]
+
+
+def stacked(gap: float, kind: str) -> System:
     """A small block over a larger one, meshes that do not match, and a rigid sphere that pushes from below."""
-    low, high = box((2.0, 2.0, 1.0), (2, 2, 1)), box((1.2, 1.3, 1.0), (3, 2, 1))
+    low, high = box((2.0, 2.0, 1.0), (2, 2, 1), kind), box((1.2, 1.3, 1.0), (3, 2, 1), kind)
     mesh = merged(low=low, high=shifted_mesh(high, 0.4, 0.35, 1.0 + gap))
     contact = [SelfContact(), RigidContact(BODIES["sphere"], motion=(0.1, 0.0, 0.1))]
     return System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("low-z0"), Clamped("high-z1")], contact=contact)
 
 
-def test_self_contact():
-    system = stacked(-0.05)
+@pytest.mark.parametrize("kind", KINDS)
+def test_self_contact(kind):
+    system = stacked(-0.05, kind)
     check_contact(system.contacts[0], random_state(system, 0.008))
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", BODIES)
-def test_rigid_body(name):
+def test_rigid_body(name, kind):
     case = RigidContact(BODIES[name], motion=(0.03, -0.02, 0.01))
-    mesh = box((2.0, 2.0, 1.0), (2, 2, 1))
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1), kind)
     system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=[case])
     state = random_state(system, 0.008)
     check_obstacle(system.contacts[0], state, case.motion)
@@ -65,8 +72,9 @@ def test_distance_of_rigid_bodies(name):
     assert (gap < 0).any()
 
 
-def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room():
-    system = stacked(1.5)  # far apart at rest: nothing is coupled between the blocks yet
+@pytest.mark.parametrize("kind", KINDS)
+def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room(kind):
+    system = stacked(1.5, kind)  # far apart at rest: nothing is coupled between the blocks yet
     pattern = system.pattern
     lift = np.where(system.mesh.points[:, 2] > 1.2, -1.55, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
     noise = 0.008 * np.random.default_rng(1).standard_normal(lift.shape)
@@ -83,9 +91,10 @@ def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room():
     assert system.pattern is pattern
 
 
-def test_nothing_touches_at_rest_or_through_a_wall():
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_touches_at_rest_or_through_a_wall(kind):
     # The walls' two sides are opposite and behind one another, at rest and when the wall has become thin.
-    mesh = half_chamber((6.0, 3.0, 6.0), (6, 3, 6))
+    mesh = half_chamber((6.0, 3.0, 6.0), (6, 3, 6), kind)
     system = System(mesh, {"body": neo_hookean()}, [Clamped("z0"), Sliding("y0")], contact=[SelfContact()])
     for thinner in (1.0, 0.5, 0.2):
         # the cavity's walls move outward until only this part of their thickness is left
@@ -98,28 +107,29 @@ def test_nothing_touches_at_rest_or_through_a_wall():
         assert system.touches(state)[0].area == 0.0
 
 
-def test_walls_are_measured():
+@pytest.mark.parametrize("kind", KINDS)
+def test_walls_are_measured(kind):
     for mesh, wall, tolerance in (
-        (half_chamber((6.0, 3.0, 6.0), (6, 3, 6)), 1.0, 0.35),
-        (shell_octant(5.0, 5.8, 2), 0.8, 0.05),
+        (half_chamber((6.0, 3.0, 6.0), (6, 3, 6), kind), 1.0, 0.35),
+        (shell_octant(5.0, 5.8, 2, kind), 0.8, 0.05),
     ):
         skin = Skin(mesh, boundary_faces(mesh.cells), {"body": neo_hookean()}, 0.0)
         assert np.median(skin.wall) == pytest.approx(wall, rel=tolerance)
 
 
-def test_closest_points_are_closest():
+@pytest.mark.parametrize("kind", KINDS)
+def test_closest_points_are_closest(kind):
     # Points in front of a curved face, against a search over a fine grid of the face.
-    mesh = shell_octant(1.0, 1.5, 1)
+    mesh = shell_octant(1.0, 1.5, 1, kind)
     face = mesh.surface("outer")[:1]
-    local = np.linspace(0.0, 1.0, 401)
-    a, b = (grid[grid_sum] for grid_sum in [np.add.outer(local, local) <= 1.0] for grid in np.meshgrid(local, local))
     skin = Skin(mesh, face, {"body": neo_hookean()}, 0.0)
-    bary = np.column_stack([1 - a - b, a, b])
-    shape = np.column_stack([bary * (2 * bary - 1), *(4 * bary[:, i] * bary[:, (i + 1) % 3] for i in range(3))])
-    surface = shape @ mesh.points[face[0]]
+    local = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 401)] * 2), axis=-1).reshape(-1, 2)
+    if kind == "tet10":
+        local = local[local.sum(axis=1) <= 1.0]
+    surface = skin.shape_at(local) @ mesh.points[face[0]]
     # the face itself, mirrored and drawn out, is the slave
     points = np.vstack([mesh.points, 1.07 * mesh.points])
-    faces = np.vstack([face, face[:, [0, 2, 1, 5, 4, 3]] + mesh.n_points]).astype(np.int32)
+    faces = np.vstack([face, face[:, skin.cell.mirrored] + mesh.n_points]).astype(np.int32)
     start, candidates = np.array([0, 0, 1]), np.array([0], np.int32)
     shape_of = (2, len(skin.rule))
     partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
@@ -127,9 +137,37 @@ def test_closest_points_are_closest():
     find_partners(points, faces, centre, radius, skin.rule, start, candidates, np.ones(2), 1.0, partner, at, gap)
     assert (partner[1] == 0).all()
     slaves = skin.shape @ points[faces[1]]
-    nearest = np.linalg.norm(slaves[:, None] - surface[None], axis=2).min(axis=1)
+    nearest = np.array([np.linalg.norm(slave - surface, axis=1).min() for slave in slaves])
     np.testing.assert_allclose(gap[1], nearest, rtol=1e-4)
     assert (gap[1] <= nearest + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", ["line3", "tri6", "quad9"])
+def test_kernels_know_the_faces_of_meshes_and_balls_hold_them(name):
+    cell, rng = CELLS[name], np.random.default_rng(3)
+    n, d = cell.n_nodes, cell.dimension
+    N, D, second = np.empty(n), np.empty((n, 2)), np.empty((n, 3))
+    local = rng.uniform(-0.1, 1.1, (20, d))
+    for place, values, slopes in zip(local, cell.shape(local), cell.gradient(local), strict=True):
+        a, b = np.pad(place, (0, 2 - d))
+        shape_functions(a, b, N, D)
+        np.testing.assert_allclose(N, values, atol=1e-14)
+        np.testing.assert_allclose(D, np.pad(slopes, ((0, 0), (0, 2 - d))), atol=1e-13)
+        second_derivatives(a, b, second)
+        for i, j, column in [(0, 0, 0), (1, 1, 1), (0, 1, 2)][: 1 if d == 1 else 3]:
+            more, less = (cell.gradient(place + h * np.eye(d)[j])[0, :, i] for h in (1e-3, -1e-3))
+            np.testing.assert_allclose(second[:, column], (more - less) / 2e-3, atol=1e-10)
+    # a face bent at random, and all of it in its ball, which is no larger than it need be for a flat one
+    grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 41)] * d), axis=-1).reshape(-1, d)
+    grid = grid[grid.sum(axis=1) <= 1.0] if cell.simplex else grid
+    flat = np.pad(cell.nodes, ((0, 0), (0, 3 - d)))
+    for bend in (0.0, 0.5):
+        x = flat + bend * rng.uniform(-1.0, 1.0, (n, 3)) * [1, 1, d == 2]
+        centre, _, radius = balls(x, np.arange(n, dtype=np.int32)[None])
+        farthest = np.linalg.norm(cell.shape(grid) @ x - centre, axis=1).max()
+        assert farthest <= radius[0] * (1 + 1e-12)
+    centre, _, radius = balls(flat, np.arange(n, dtype=np.int32)[None])
+    assert radius[0] == pytest.approx(np.linalg.norm(flat - centre, axis=1).max())
 
 
 def test_refusals():

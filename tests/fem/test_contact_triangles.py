@@ -95,7 +95,8 @@ def test_many_triangles_make_a_sphere():
     np.testing.assert_allclose(distance, np.linalg.norm(x, axis=1) - 1.0, atol=0.02)
 
 
-def test_a_file_presses_as_the_same_box_does(tmp_path):
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_a_file_presses_as_the_same_box_does(tmp_path, kind):
     lower, upper = (-0.5, -0.5, 0.95), (1.5, 1.5, 1.6)
     corners = np.array([[x, y, z] for x in (-0.5, 1.5) for y in (-0.5, 1.5) for z in (0.95, 1.6)])
     points, triangles = hull(corners)
@@ -103,9 +104,8 @@ def test_a_file_presses_as_the_same_box_does(tmp_path):
     forces = []
     for body in (Box(lower, upper), TriangleBody.from_stl(tmp_path / "plate.stl")):
         contact = [RigidContact(body, "z1", motion=(0.0, 0.0, -0.05))]
-        system = System(
-            box((1.0, 1.0, 1.0), (2, 2, 2)), {"body": neo_hookean(1.0, 10.0)}, [Clamped("z0")], (), (), None, contact
-        )
+        mesh = box((1.0, 1.0, 1.0), (2, 2, 2), kind)
+        system = System(mesh, {"body": neo_hookean(1.0, 10.0)}, [Clamped("z0")], contact=contact)
         forces.append(system.touches(solve_path(system, [1.0])[0].state)[0].force)
     assert forces[0][2] > 0.1
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-5, atol=1e-6)

@@ -18,16 +18,18 @@ from turgor.mesh.structured import box, rectangle
 from turgor.solver.path import solve_path
 
 
-def pressed(friction: float = 0.0) -> System:
+def pressed(friction: float = 0.0, kind: str = "tet10") -> System:
     """A block over a ball on an oblique spring, whose far end is pushed."""
     spring = Spring(0.7, (0.3, 0.1, 1.0))
     contact = [RigidContact(Sphere((1.0, 1.0, -2.95), 3.0), "z0", (0.05, 0.02, 0.1), "ball", friction, spring=spring)]
-    return System(box((2.0, 2.0, 1.0), (2, 2, 1)), {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=contact)
+    mesh = box((2.0, 2.0, 1.0), (2, 2, 1), kind)
+    return System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=contact)
 
 
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_forces_and_stiffness_are_derivatives_of_the_energy(friction):
-    system = pressed(friction)
+def test_forces_and_stiffness_are_derivatives_of_the_energy(friction, kind):
+    system = pressed(friction, kind)
     noise = 0.008 * np.random.default_rng(2).standard_normal(system.constraints.value.shape)
     state = system.consistent(system.nodal(system.free_part(noise)), system.loads_at(0.4))
     state = system.gripped(state, dragged=True)

@@ -20,14 +20,15 @@ from turgor.fem.system import System
 from turgor.mesh.structured import box, rectangle
 
 SLIPPERY = 0.02
+BODIES = [(2, "quad9"), (3, "tet10"), (3, "hex27")]
 
 
-def on_a_body(dimension: int) -> System:
+def on_a_body(dimension: int, kind: str = "tet10") -> System:
     flat, body = (
         (rectangle((2.0, 1.0), (3, 2)), Sphere((1.2, -2.8), 3.0))
         if dimension == 2
         else (
-            box((2.0, 2.0, 1.0), (2, 2, 1)),
+            box((2.0, 2.0, 1.0), (2, 2, 1), kind),
             Sphere((1.2, 1.0, -2.8), 3.0),
         )
     )
@@ -38,12 +39,13 @@ def on_a_body(dimension: int) -> System:
     return System(flat, {"body": neo_hookean(ratio=20)}, [Clamped(top)], section=section, contact=contact)
 
 
-def on_itself(dimension: int) -> System:
+def on_itself(dimension: int, kind: str = "tet10") -> System:
     if dimension == 2:
         low, high = rectangle((2.0, 1.0), (3, 2)), shifted_mesh(rectangle((1.2, 1.0), (2, 1)), 0.4, 0.97)
         held, section = [Clamped("low-y0"), Clamped("high-y1")], PlaneStrain(2.0)
     else:
-        low, high = box((2.0, 2.0, 1.0), (2, 2, 1)), shifted_mesh(box((1.2, 1.3, 1.0), (3, 2, 1)), 0.4, 0.35, 0.95)
+        low, high = box((2.0, 2.0, 1.0), (2, 2, 1), kind), box((1.2, 1.3, 1.0), (3, 2, 1), kind)
+        high = shifted_mesh(high, 0.4, 0.35, 0.95)
         held, section = [Clamped("low-z0"), Clamped("high-z1")], None
     mesh, contact = merged(low=low, high=high), [SelfContact(friction=SLIPPERY)]
     return System(mesh, {"body": neo_hookean(ratio=20)}, held, section=section, contact=contact)
@@ -62,16 +64,16 @@ def rubbed(system: System):
     return moved
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_forces_and_stiffness_on_a_body(dimension):
-    system = on_a_body(dimension)
+@pytest.mark.parametrize(("dimension", "kind"), BODIES)
+def test_forces_and_stiffness_on_a_body(dimension, kind):
+    system = on_a_body(dimension, kind)
     motion = np.pad(system.contacts[0].motion, (0, 3 - dimension))
     check_obstacle(system.contacts[0], rubbed(system), motion)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_forces_and_stiffness_of_self_contact(dimension):
-    system = on_itself(dimension)
+@pytest.mark.parametrize(("dimension", "kind"), BODIES)
+def test_forces_and_stiffness_of_self_contact(dimension, kind):
+    system = on_itself(dimension, kind)
     check_contact(system.contacts[0], rubbed(system))
 
 

@@ -20,12 +20,13 @@ def checked(mesh):
     return skin, IntersectionCheck(skin)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_blocks_may_overlap_by_one_percent_of_their_walls(dimension):
-    if dimension == 2:
+@pytest.mark.parametrize("kind", ["quad9", "tet10", "hex27"])
+def test_blocks_may_overlap_by_one_percent_of_their_walls(kind):
+    if kind == "quad9":
         low, high, away = rectangle((2.0, 1.0), (4, 2)), rectangle((1.0, 1.0), (3, 1)), (0.3, 1.0)
     else:
-        low, high, away = box((2.0, 2.0, 1.0), (4, 4, 2)), box((1.0, 1.0, 1.0), (3, 3, 1)), (0.3, 0.5, 1.0)
+        low, high = box((2.0, 2.0, 1.0), (4, 4, 2), kind), box((1.0, 1.0, 1.0), (3, 3, 1), kind)
+        away = (0.3, 0.5, 1.0)
     mesh = merged(low=low, high=shifted_mesh(high, *away))
     skin, check = checked(mesh)
     assert skin.wall == pytest.approx(np.ones(len(skin.faces)))
@@ -35,7 +36,9 @@ def test_blocks_may_overlap_by_one_percent_of_their_walls(dimension):
         assert check.intersects(u) == expected, gap
 
 
-@pytest.mark.parametrize("mesh", [shell_octant(1.0, 1.2, 1), quarter_ring(1.0, 1.2, 1)])
+@pytest.mark.parametrize(
+    "mesh", [shell_octant(1.0, 1.2, 1), shell_octant(1.0, 1.2, 2, "hex27"), quarter_ring(1.0, 1.2, 1)]
+)
 def test_a_curved_shell_does_not_meet_itself(mesh):
     _, check = checked(mesh)
     u = np.zeros_like(mesh.points)

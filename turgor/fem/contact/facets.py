@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from turgor.fem.contact.skin import Skin
+from turgor.mesh.cells import Cell
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -41,7 +42,7 @@ class Facets:
 
     def __init__(self, skin: Skin) -> None:
         self.skin = skin
-        local, pieces, keys = _lattice(skin.faces, skin.dimension)
+        local, pieces, keys = _lattice(skin.faces, skin.cell)
         _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         self.number = number.reshape(len(skin.faces), -1)
         self.pieces = np.ascontiguousarray(self.number[:, pieces].reshape(-1, pieces.shape[1]), dtype=np.int32)
@@ -67,31 +68,54 @@ class Facets:
         return np.asarray(outward / np.maximum(np.linalg.norm(outward, axis=1), np.finfo(float).tiny)[:, None])
 
 
-def _lattice(faces: Ints, dimension: int) -> tuple[Floats, Ints, NDArray[np.int64]]:
+def _lattice(faces: Ints, cell: Cell) -> tuple[Floats, Ints, NDArray[np.int64]]:
     """Return the points ``(p, 2)`` that a face is cut at, its pieces ``(m, d)`` and what tells the points apart.
 
     The last, ``(k p, 4)``, is the same for points that faces share: on a side its two corners and how far along, at a
     corner the corner, inside the face itself.
     """
-    n = PARTS
-    steps = [(i, j) for j in range(n + 1 if dimension == 3 else 1) for i in range(n + 1 - j)]
-    at = {step: number for number, step in enumerate(steps)}
-    pieces: list[tuple[int, ...]]
-    if dimension == 2:
-        pieces = [(i, i + 1) for i in range(n)]
-    else:
-        pieces = [(at[i, j], at[i + 1, j], at[i, j + 1]) for i, j in steps if i + j < n]
-        pieces += [(at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]) for i, j in steps if i + j < n - 1]
+    steps = _steps(cell)
     keys = np.empty((len(faces), len(steps), 4), np.int64)
     for number, (i, j) in enumerate(steps):
-        # how much of each corner is in the point, in n-ths
-        parts = np.array([n - i - j, i, j][:dimension])
+        parts = _corner_parts(cell, i, j)
         used = np.flatnonzero(parts)
-        if len(used) == 3 or (dimension == 2 and len(used) == 2):
+        if len(used) > cell.dimension:
             keys[:, number] = np.column_stack([np.arange(len(faces)), *(np.full(len(faces), v) for v in (-1, i, j))])
             continue
         corners, shares = faces[:, used], np.broadcast_to(parts[used], (len(faces), len(used)))
         order = np.argsort(corners, axis=1)
         corners, shares = np.take_along_axis(corners, order, 1), np.take_along_axis(shares, order, 1)
         keys[:, number] = np.column_stack([corners[:, 0], corners[:, -1], shares[:, 0], shares[:, -1]])
-    return np.array(steps) / n, np.array(pieces, np.int32), keys.reshape(-1, 4)
+    return np.array(steps) / PARTS, np.array(_pieces(cell, steps), np.int32), keys.reshape(-1, 4)
+
+
+def _steps(cell: Cell) -> list[tuple[int, int]]:
+    """Return the points that a face is cut at, in steps along its coordinates."""
+    n = PARTS
+    if cell.dimension == 1:
+        return [(i, 0) for i in range(n + 1)]
+    return [(i, j) for j in range(n + 1) for i in range(n + 1 - (j if cell.simplex else 0))]
+
+
+def _corner_parts(cell: Cell, i: int, j: int) -> Ints:
+    """Return how much of each corner is in a point of a flat face: in n-ths, in a quadrilateral in parts of n²."""
+    n = PARTS
+    if cell.simplex:
+        return np.array([n - i - j, i, j][: cell.n_corners], np.int32)
+    return np.array([(n - i) * (n - j), i * (n - j), i * j, (n - i) * j], np.int32)
+
+
+def _pieces(cell: Cell, steps: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Return the pieces, in places among the `steps`, as the face turns."""
+    at = {step: number for number, step in enumerate(steps)}
+    if cell.dimension == 1:
+        return [(at[i, 0], at[i + 1, 0]) for i in range(PARTS)]
+    pieces: list[tuple[int, ...]] = []
+    for i, j in steps:
+        square = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+        if not cell.simplex and (i + j) % 2:
+            # cut along the other diagonal: a quadrilateral looks the same from all its sides
+            square = square[1:] + square[:1]
+        halves = square[:2] + square[3:], square[1:]
+        pieces += [tuple(at[step] for step in half) for half in halves if set(half) <= set(at)]
+    return pieces

@@ -5,9 +5,9 @@ faces curved. Its gap is ``g = n · (x − y)``, n the master's unit normal at t
 overlap. Shapes: ``k`` faces of ``n`` nodes, ``q`` quadrature points a face, ``d`` displacement components; the nodes of
 a pair are the slave's, then the master's.
 
-Faces are six-node triangles (d = 3) or, in the plane z = 0, three-node edges (d = 2). One set of kernels serves both:
-an edge is the side b = 0 of a six-node triangle, and its second tangent is the unit vector out of the plane. Positions
-have three components in both.
+Faces are six-node triangles or nine-node quadrilaterals (d = 3) or, in the plane z = 0, three-node edges (d = 2). One
+set of kernels serves all, by the shape functions of :mod:`turgor.fem.contact.shapes`: the second tangent of an edge is
+the unit vector out of the plane. Positions always have three components.
 """
 
 from __future__ import annotations
@@ -16,7 +16,17 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.contact.shapes import (
+    EDGE,
+    control_weights,
+    flat_projection,
+    inside,
+    middle,
+    second_derivatives,
+    shape_functions,
+)
 from turgor.fem.kernels import inlined, jit, parallel
+from turgor.mesh.cells import CELLS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -31,38 +41,9 @@ SURE = 2.0
 """A point whose projection on the flat face of the corners lies so far outside is not looked at further."""
 
 BULGE = 1.2
-"""A face, and what lies so little outside it, is within so many radii of its ball, which is drawn around its nodes."""
+"""What lies so little outside a face is within so many radii of the ball that the face itself lies in."""
 
 NOWHERE = -1
-
-
-@inlined
-def shape_functions(a, b, N, D):  # type: ignore[no-untyped-def]
-    """Write the ``n`` shape functions at the local point (a, b) into `N` and their derivatives into ``D (n, 2)``."""
-    if len(N) == EDGE:
-        N[0], N[1], N[2] = (1.0 - a) * (1.0 - 2.0 * a), a * (2.0 * a - 1.0), 4.0 * a * (1.0 - a)
-        D[0, 0], D[1, 0], D[2, 0] = 4.0 * a - 3.0, 4.0 * a - 1.0, 4.0 - 8.0 * a
-        D[:, 1] = 0.0
-    else:
-        c = 1.0 - a - b
-        N[0], N[1], N[2] = c * (2.0 * c - 1.0), a * (2.0 * a - 1.0), b * (2.0 * b - 1.0)
-        N[3], N[4], N[5] = 4.0 * c * a, 4.0 * a * b, 4.0 * b * c
-        D[0, 0] = D[0, 1] = 1.0 - 4.0 * c
-        D[1, 0], D[1, 1] = 4.0 * a - 1.0, 0.0
-        D[2, 0], D[2, 1] = 0.0, 4.0 * b - 1.0
-        D[3, 0], D[3, 1] = 4.0 * (c - a), -4.0 * a
-        D[4, 0], D[4, 1] = 4.0 * b, 4.0 * a
-        D[5, 0], D[5, 1] = -4.0 * b, 4.0 * (c - b)
-
-
-EDGE = 3
-"""Nodes of an edge."""
-
-# Second derivatives of the shape functions by (a, a), (b, b) and (a, b).
-ON_TRIANGLE = np.array(
-    [[4.0, 4.0, 4.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [-8.0, 0.0, -4.0], [0.0, 0.0, 4.0], [0.0, -8.0, -4.0]]
-)
-ON_EDGE = np.array([[4.0, 0.0, 0.0], [4.0, 0.0, 0.0], [-8.0, 0.0, 0.0]])
 
 
 @inlined
@@ -92,71 +73,43 @@ def surface_frame(x, face, N, D, position, tangent, normal):  # type: ignore[no-
 
 
 def balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return centre ``(k, 3)``, unit normal ``(k, 3)`` and radius ``(k,)`` of balls around the faces' nodes."""
+    """Return centre ``(k, 3)``, unit normal ``(k, 3)`` and radius ``(k,)`` of balls that the faces lie in."""
     centre, normal, radius = np.empty((len(faces), 3)), np.empty((len(faces), 3)), np.empty(len(faces))
-    _fill_balls(x, faces, centre, normal, radius)
+    _fill_balls(x, faces, _CONTROL[faces.shape[1]], centre, normal, radius)
     return centre, normal, radius
 
 
+_CONTROL = {CELLS[name].n_nodes: control_weights(CELLS[name]) for name in ("line3", "tri6", "quad9")}
+
+
 @parallel
-def _fill_balls(x, faces, centre, normal, radius):  # type: ignore[no-untyped-def]
+def _fill_balls(x, faces, control, centre, normal, radius):  # type: ignore[no-untyped-def]
     n = faces.shape[1]
-    middle = 1.0 / (2.0 if n == EDGE else 3.0)
     for f in nb.prange(len(faces)):
         N, D, tangent = np.empty(n), np.empty((n, 2)), np.empty((2, 3))
-        shape_functions(middle, middle, N, D)
+        shape_functions(middle(n), middle(n), N, D)
         surface_frame(x, faces[f], N, D, centre[f], tangent, normal[f])
         square = 0.0
-        for a in range(n):
-            away = x[faces[f, a]] - centre[f]
-            square = max(square, dot(away, away))
+        for p in range(n):
+            away = 0.0
+            for i in range(3):
+                place = -centre[f, i]
+                for a in range(n):
+                    place += control[p, a] * x[faces[f, a], i]
+                away += place * place
+            square = max(square, away)
         radius[f] = np.sqrt(square)
 
 
 @jit
-def flat_projection(x, face, point, local):  # type: ignore[no-untyped-def]
-    """Write the local coordinates of `point` projected on the flat face of the corners; False if it has no area."""
-    if len(face) == EDGE:
-        local[1] = length = along = 0.0
-        for i in range(3):
-            span = x[face[1], i] - x[face[0], i]
-            length += span * span
-            along += span * (point[i] - x[face[0], i])
-        local[0] = along / length
-        return length > 0.0
-    m00 = m01 = m11 = r0 = r1 = 0.0
-    for i in range(3):
-        origin = x[face[0], i]
-        first, second = x[face[1], i] - origin, x[face[2], i] - origin
-        away = point[i] - origin
-        m00 += first * first
-        m01 += first * second
-        m11 += second * second
-        r0 += first * away
-        r1 += second * away
-    determinant = m00 * m11 - m01 * m01
-    if determinant <= 1e-12 * m00 * m11:
-        return False
-    local[0] = (m11 * r0 - m01 * r1) / determinant
-    local[1] = (m00 * r1 - m01 * r0) / determinant
-    return True
-
-
-@jit
-def inside(local, tolerance):  # type: ignore[no-untyped-def]
-    """Whether local coordinates lie in the face, widened by `tolerance`."""
-    return local[0] > -tolerance and local[1] > -tolerance and local[0] + local[1] < 1.0 + tolerance
-
-
-@jit
-def closest_point(x, face, point, local, N, D, position, tangent, normal):  # type: ignore[no-untyped-def]
+def closest_point(x, face, point, local, N, D, second, position, tangent, normal):  # type: ignore[no-untyped-def]
     """Find the closest point of a curved face by Newton's method from `local` on; False if there is none near.
 
     Writes its local coordinates, shape functions and frame.
     """
-    second = ON_EDGE if len(face) == EDGE else ON_TRIANGLE
     for _ in range(12):
         shape_functions(local[0], local[1], N, D)
+        second_derivatives(local[0], local[1], second)
         surface_frame(x, face, N, D, position, tangent, normal)
         away = point - position
         r0, r1 = dot(away, tangent[0]), dot(away, tangent[1])
@@ -182,7 +135,7 @@ def closest_point(x, face, point, local, N, D, position, tangent, normal):  # ty
             return True
         local[0] += d0
         local[1] += d1
-        if not inside(local, SURE):
+        if not inside(len(face), local, SURE):
             return False
         if size < 1e-8:
             # Newton's method squares the error: one more evaluation is exact.
@@ -217,7 +170,7 @@ def find_partners(  # type: ignore[no-untyped-def]
     n = faces.shape[1]
     for f in nb.prange(len(faces)):
         N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
-        point, outward, trial = np.empty(3), np.empty(3), np.empty(2)
+        point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
         for q in range(len(rule)):
             partner[f, q] = NOWHERE
             gap[f, q] = np.inf
@@ -233,11 +186,11 @@ def find_partners(  # type: ignore[no-untyped-def]
                 far = BULGE * radius[m] + max(reach, min(depth[f], depth[m]))
                 if square > far * far:
                     continue
-                if not flat_projection(x, faces[m], point, trial) or not inside(trial, 0.5):
+                if not flat_projection(x, faces[m], point, trial) or not inside(n, trial, 0.5):
                     continue
-                if not closest_point(x, faces[m], point, trial, N, D, position, tangent, normal):
+                if not closest_point(x, faces[m], point, trial, N, D, second, position, tangent, normal):
                     continue
-                if not inside(trial, OUTSIDE) or dot(outward, normal) > FACING:
+                if not inside(n, trial, OUTSIDE) or dot(outward, normal) > FACING:
                     continue
                 g = dot(normal, point - position)
                 if g < -min(depth[f], depth[m]) or g > reach:
@@ -282,16 +235,16 @@ def pair_stiffness(x, slaves, masters, at, local, gap, normal_stiffness, force, 
     """
     n = slaves.shape[1]
     rows = 2 * n * d
-    second = ON_EDGE if n == EDGE else ON_TRIANGLE
     for p in nb.prange(len(slaves)):
         N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
-        shape_at = np.empty(2 * n)
+        second, shape_at = np.empty((n, 3)), np.empty(2 * n)
         m, b, A = np.empty((2, 2)), np.zeros((2, 2)), np.empty((2, 2))
         G, T, S = np.empty(rows), np.empty((2, rows)), np.zeros((2, rows))
         shape_functions(at[p, 0], at[p, 1], N, D)
         shape_at[:n] = N
         shape_functions(local[p, 0], local[p, 1], N, D)
         shape_at[n:] = -N
+        second_derivatives(local[p, 0], local[p, 1], second)
         surface_frame(x, masters[p], N, D, position, tangent, normal)
         for a in range(n):
             height = dot(normal, x[masters[p, a]])

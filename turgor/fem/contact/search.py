@@ -72,7 +72,7 @@ class Search:
         centre, normal, radius = balls(x, skin.faces)
         boxes = np.empty((len(self._links), 2, 6))
         _fit(centre, normal, radius, self._links, self._order, boxes)
-        corners = np.ascontiguousarray(skin.faces[:, : skin.dimension])
+        corners = np.ascontiguousarray(skin.faces[:, : skin.cell.n_corners])
         now = (centre, normal, radius, skin.depth, reach)
         always = (corners, self._group, *self._rest, skin.wall, skin.part)
         tree = (boxes, self._links, self._order)

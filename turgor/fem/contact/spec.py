@@ -174,10 +174,8 @@ def make_contact(
     Raises
     ------
     InputError
-        If the mesh has no such surface, its faces are quadrilaterals, or a rigid body does not fit the section.
+        If the mesh has no such surface, or a rigid body does not fit the section.
     """
-    if mesh.cell_type == "hex27":
-        raise InputError("contact works on meshes of tetrahedra or plane cells", key="contact", value=mesh.cell_type)
     barrier = case.method == "barrier"
     if isinstance(case, RigidContact):
         faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
