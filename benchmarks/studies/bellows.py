@@ -12,6 +12,7 @@ from examples import Row, asked_for, print_displacements
 
 FIVE = 'loads.0.value="5 kPa"'
 HELD = (50.0, 80.0, 150.0)
+EMPTIED = (-16.0, -32.0, -48.0, -64.0, -80.0)
 SECTION = "MR2, section of 0.2 mm"
 QUARTERS = ("MR2, quarter of 2.5 mm", "MR2, quarter of 1.25 mm")
 
@@ -32,6 +33,8 @@ ROWS = (
     Row(SECTION, "bellows", ('mesh.size="0.2 mm"',), (50.0,), "14.5"),
     Row(QUARTERS[0], "bellows-quarter", (), (50.0,), "14.5"),
     Row(QUARTERS[1], "bellows-quarter", ('mesh.size="1.25 mm"',), (50.0,), "14.5"),
+    Row("emptied, section", "bellows", ('loads.0.value="-80 kPa"',), EMPTIED),
+    Row("emptied, quarter", "bellows-vacuum", (), EMPTIED),
 )
 
 

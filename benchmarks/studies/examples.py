@@ -57,7 +57,7 @@ class Ran:
 
     def at(self, pressure: float, key: str = "max_displacement_mm") -> float | None:
         """Return a value of the history at a pressure in kPa, if the run came so far."""
-        reached = (row for row in self.history if abs(float(row["pressure_kPa"]) - pressure) <= 1e-6 * pressure)
+        reached = (row for row in self.history if abs(float(row["pressure_kPa"]) - pressure) <= 1e-6 * abs(pressure))
         return next((float(row[key]) for row in reached), None)
 
 
