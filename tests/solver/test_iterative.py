@@ -21,7 +21,7 @@ from turgor.mesh.cells import body_cell
 from turgor.mesh.generate import generate
 from turgor.mesh.structured import box, rectangle, shell_octant
 from turgor.solver import choice, coarse, iterative
-from turgor.solver.blocks import BlockRows, invert_diagonal, multiply, sweep_backward, sweep_forward
+from turgor.solver.blocks import BlockMatrix
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.iterative import AUGMENTATION, Iterative
 from turgor.solver.krylov import gmres
@@ -57,6 +57,25 @@ def full(upper):
 def dense(system, values):
     n = system.n_dofs
     return full(sp.csr_matrix((values, system.pattern.column, system.pattern.row_start), shape=(n, n)).toarray())
+
+
+def split(system, state, order=None):
+    """Return the volume equations, and A in double precision, its nodes as they are or in an order."""
+    matrix = BlockMatrix(system.pattern)
+    layout, values = matrix.layout, np.zeros(9 * matrix.structure.nnz)
+    equations = system.split_stiffness(state, AUGMENTATION, layout, values)
+    graph = sp.triu(system.pattern.graph(), format="coo")
+    n = len(matrix.order)
+    whole = np.zeros((n, 3, n, 3))
+    for a, b, name in zip(graph.row, graph.col, graph.data, strict=True):
+        to, width = layout.above[name - 1], layout.above_width[name - 1]
+        back, back_width = layout.below[name - 1], layout.below_width[name - 1]
+        for i in range(3):
+            whole[a, i, b] = values[to + i * width : to + i * width + 3]
+            whole[b, i, a] = values[back + i * back_width : back + i * back_width + 3]
+    if order is not None:
+        whole = whole[order][:, :, order]
+    return equations, whole.reshape(3 * n, 3 * n)
 
 
 @pytest.mark.parametrize("ratio", [1e3, 1e5])
@@ -98,50 +117,68 @@ def test_the_split_stiffness_is_the_stiffness(cell_type):
     system = sphere(cell_type, 1)
     state = random_state(system, 0.005)
     whole = dense(system, system.stiffness(state))
-    values, (equations,) = system.split_stiffness(state, AUGMENTATION)
+    (equations,), softer = split(system, state)
     rest = np.zeros((system.mesh.points.size,) * 2)
     for nodes, gradient, bulk in zip(equations.nodes, equations.gradient, equations.bulk, strict=True):
         places = 3 * nodes + np.arange(3)[:, None]
         flat = gradient.reshape(len(gradient), -1)
         rest[np.ix_(places.ravel(), places.ravel())] += flat.T @ bulk @ flat
     free = system.pattern.free
-    softer = dense(system, values)
+    softer = softer[np.ix_(free, free)]
     np.testing.assert_allclose(softer + rest[np.ix_(free, free)], whole, atol=1e-11 * np.abs(whole).max())
     assert np.abs(softer).max() < 0.1 * np.abs(whole).max()
 
 
-def test_block_rows_hold_the_matrix_and_identity_where_components_are_fixed():
-    system = sphere("tet10", 1)
-    values = system.stiffness(random_state(system, 0.005))
-    rows = BlockRows(system.pattern)
-    n = len(rows.order)
-    whole = np.eye(3 * n)
-    free = system.pattern.free
-    whole[np.ix_(free, free)] = dense(system, values)
-    x = np.random.default_rng(0).standard_normal((n, 3))
-    product = np.empty(3 * n)
-    multiply(rows.start, rows.column, rows.values(values), x[rows.order].ravel(), product)
-    np.testing.assert_allclose(product.reshape(n, 3)[rows.rank].ravel(), whole @ x.ravel(), rtol=1e-10)
+@pytest.mark.parametrize("indefinite", [False, True])
+def test_block_products_and_sweeps_are_those_of_the_matrix(indefinite):
+    system = sphere("tet10", 2)
+    state = system.reference_state()
+    matrix = BlockMatrix(system.pattern)
+    system.split_stiffness(state, AUGMENTATION, matrix.layout, matrix.values)
+    _, whole = split(system, state, matrix.order)
+    n, some = len(matrix.order), [3, 11]
+    if indefinite:
+        matrix.diagonal[some] -= 2.0 * np.abs(matrix.diagonal).max() * np.eye(3)
+        for a in some:
+            whole[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = matrix.diagonal[a]
+    matrix.update()
+    diagonal = matrix.diagonal.astype(float)
+    if indefinite:
+        diagonal[some] = np.eye(3) * np.abs(diagonal[some])
+    x = np.random.default_rng(0).standard_normal(3 * n)
+    near = {"rtol": 0.0, "atol": 1e-5 * np.abs(whole @ x).max()}
+    np.testing.assert_allclose(matrix.product(x), whole @ x, **near)
+    node = np.arange(3 * n) // 3
+    lower, upper = whole * (node[:, None] > node), whole * (node[:, None] < node)
+    for a in range(n):
+        lower[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = upper[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = diagonal[a]
+    right = np.random.default_rng(1).standard_normal(3 * n)
+    found, left = matrix.sweep_forward(right)
+    np.testing.assert_allclose(found, np.linalg.solve(lower, right), atol=1e-5 * np.abs(found).max())
+    np.testing.assert_allclose(left, right - whole @ found, atol=1e-5 * np.abs(whole @ found).max())
+    found, product = matrix.sweep_backward(right, x)
+    np.testing.assert_allclose(found, x + np.linalg.solve(upper, right - whole @ x), atol=1e-5 * np.abs(found).max())
+    np.testing.assert_allclose(product, whole @ found, atol=1e-5 * np.abs(whole @ found).max())
 
 
 @pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
 def test_the_cycle_is_symmetric_positive_definite_and_near_the_inverse(cell_type):
     system = System(box((1.0, 1.0, 6.0), (1, 1, 6), cell_type), {"body": neo_hookean()}, PLANES)
-    assert len(BlockRows(system.pattern).bounds) > 2  # or else no portion has a neighbour
     levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
-    values, _ = system.split_stiffness(system.reference_state(), AUGMENTATION)
-    levels.update(levels.rows.values(values))
+    assert len(levels.fine._bounds) > 2  # or else no portion has a neighbour
+    state = system.reference_state()
+    system.split_stiffness(state, AUGMENTATION, levels.fine.layout, levels.fine.values)
+    levels.update()
     free = levels.free.ravel()
     columns = []
     for k in np.flatnonzero(free):
         unit = np.zeros(len(free))
         unit[k] = 1.0
-        columns.append(levels.apply(unit)[free])
+        columns.append(levels.apply(unit)[0][free])
     cycle = np.array(columns)
     np.testing.assert_allclose(cycle, cycle.T, atol=1e-5 * np.abs(cycle).max())
-    number = np.cumsum(system.pattern.free).reshape(-1, 3)[levels.rows.order].ravel()[free] - 1
-    matrix = dense(system, values)[np.ix_(number, number)]
-    root = np.linalg.cholesky(matrix)
+    _, whole = split(system, state, levels.fine.order)
+    root = np.linalg.cholesky(whole[np.ix_(free, free)])
     spectrum = np.linalg.eigvalsh(root.T @ (0.5 * (cycle + cycle.T)) @ root)
     assert spectrum[0] > 0.1
     assert spectrum[-1] < 1.0 + 1e-3  # of a symmetric cycle with exact coarse solution
@@ -208,19 +245,36 @@ def test_it_follows_the_path_by_volume_to_the_same_limit():
 def test_gmres():
     rng = np.random.default_rng(0)
     matrix = rng.standard_normal((90, 90)) + 12.0 * np.diag(np.sign(rng.standard_normal(90)))
-    right, zero = rng.standard_normal(90), np.zeros(90)
+    right = rng.standard_normal(90)
     exact = np.linalg.solve(matrix, right)
-    for preconditioner in (np.eye(90), np.diag(1.0 / np.diag(matrix))):
-        found, iterations, converged = gmres(matrix.__matmul__, preconditioner.__matmul__, right, zero, 1e-8, 400)
+    for inverse in (np.eye(90), np.diag(1.0 / np.diag(matrix))):
+        found, iterations, converged = gmres(improving(matrix, inverse), right, 1e-8, 400)
         assert converged
         assert 10 < iterations < 200
         np.testing.assert_allclose(found, exact, atol=1e-5)
-    *_, converged = gmres(matrix.__matmul__, np.eye(90).__matmul__, right, zero, 1e-8, 5)
+    *_, converged = gmres(improving(matrix, np.eye(90)), right, 1e-8, 5)
     assert not converged
-    found, iterations, converged = gmres(matrix.__matmul__, np.eye(90).__matmul__, zero, zero, 1e-8, 5)
+    found, iterations, converged = gmres(improving(matrix, np.eye(90)), np.zeros(90), 1e-8, 5)
     assert converged
     assert iterations == 0
     assert not found.any()
+
+
+def improving(matrix, inverse):
+    return lambda x: (inverse @ x, matrix @ (inverse @ x))
+
+
+@pytest.mark.parametrize("accuracy", [2e-3, 1e-9])
+def test_solutions_are_as_accurate_as_asked_for(accuracy):
+    system = tube(3.0)
+    state = system.consistent(0.01 * np.sin(system.mesh.points), np.array([0.015]))
+    solver, exact = Iterative(system), direct(system)
+    for kind in (solver, exact):
+        kind.take_stiffness(system, state)
+    right = np.random.default_rng(0).standard_normal(system.n_dofs)
+    solution = exact.solve(right)
+    error = np.linalg.norm(solver.solution(system, right, accuracy).u - system.nodal(solution))
+    assert error < 30.0 * accuracy * np.linalg.norm(solution)
 
 
 def test_the_path_is_chosen_by_size(monkeypatch):
@@ -255,22 +309,17 @@ def test_an_unknown_path_is_refused():
 def test_the_sweeps_do_not_depend_on_the_threads():
     threads = numba.get_num_threads()
     system = System(box((1.0, 1.0, 30.0), (1, 1, 30)), {"body": neo_hookean()}, PLANES)
-    rows = BlockRows(system.pattern)
-    assert len(rows.bounds) > 5
-    values = rows.values(system.stiffness(system.reference_state()))
-    inverse = np.empty((len(rows.order), 3, 3))
-    invert_diagonal(rows.start, rows.diagonal, values, inverse)
-    right = np.random.default_rng(0).standard_normal(3 * len(rows.order))
+    matrix = BlockMatrix(system.pattern)
+    assert len(matrix._bounds) > 5
+    system.split_stiffness(system.reference_state(), AUGMENTATION, matrix.layout, matrix.values)
+    matrix.update()
+    right = np.random.default_rng(0).standard_normal(3 * len(matrix.order))
     found = []
     try:
         for number in (1, threads):
             numba.set_num_threads(number)
-            x = np.zeros_like(right)
-            for odd in (0, 1):
-                sweep_forward(rows.start, rows.column, rows.diagonal, rows.bounds, values, inverse, right, x, odd)
-            for odd in (1, 0):
-                sweep_backward(rows.start, rows.column, rows.bounds, values, inverse, right, x, odd)
-            found.append(x)
+            x, _ = matrix.sweep_forward(right)
+            found.append(matrix.sweep_backward(right, x)[0])
     finally:
         numba.set_num_threads(threads)
     assert np.linalg.norm(found[0]) > 0.0

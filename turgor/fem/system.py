@@ -21,7 +21,7 @@ from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
 from turgor.fem.membrane import BondedMembrane, Membrane
-from turgor.fem.pattern import SparsePattern, packed_size
+from turgor.fem.pattern import BlockLayout, SparsePattern, packed_size
 from turgor.fem.programme import PROPORTIONAL, Programme
 from turgor.fem.section import PlaneStress, Section, check_section, in_section
 from turgor.fem.sheet import Sheet
@@ -199,14 +199,28 @@ class System:
         Where the pattern has no room for what touches now, :attr:`pattern`
         is another one afterwards.
         """
-        return self._assembled(state, None)[0]
+        self._fill_blocks(state, None)
+        self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
+        if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
+            self._couplings += [contact.couplings(state.u) for contact in self.contacts]
+            self.pattern = self._make_pattern()
+        values = np.empty(self.pattern.n_stored)
+        self.pattern.sum_blocks(self._packed, values)
+        for nodes, packed in self._touching:
+            self.pattern.add_blocks(nodes, packed, values)
+        return values
 
-    def split_stiffness(self, state: State, augmentation: float) -> tuple[Floats, list[VolumeEquations]]:
-        """Return A and the volume equations of the solids, whose pressures are not condensed into it.
+    def split_stiffness(
+        self, state: State, augmentation: float, layout: BlockLayout, out: NDArray[np.floating]
+    ) -> list[VolumeEquations]:
+        """Fill `out` with the blocks of A; return the volume equations of the solids, which are not condensed into it.
 
-        A is :meth:`stiffness` with, in every element, at most `augmentation` shear moduli in place of the bulk modulus.
+        A is :meth:`stiffness` with, in every element, at most `augmentation` shear moduli in place of the bulk modulus;
+        fixed components are identity. It knows nothing of contact.
         """
-        return self._assembled(state, augmentation)
+        equations = self._fill_blocks(state, augmentation)
+        self.pattern.sum_into_layout(self._packed, layout, out)
+        return equations
 
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
@@ -318,7 +332,7 @@ class System:
         """Return the smallest det F over all quadrature points and the cell where it is."""
         return min(solid.worst_jacobian(u) for solid in self.solids)
 
-    def _assembled(self, state: State, augmentation: float | None) -> tuple[Floats, list[VolumeEquations]]:
+    def _fill_blocks(self, state: State, augmentation: float | None) -> list[VolumeEquations]:
         equations = []
         for k, term in enumerate(self.terms):
             block = self._block(k)
@@ -329,15 +343,7 @@ class System:
             else:
                 term.stiffness(state, state.lagged[k], block)
             self._frames.turn(k, block)
-        self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
-        if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
-            self._couplings += [contact.couplings(state.u) for contact in self.contacts]
-            self.pattern = self._make_pattern()
-        values = np.empty(self.pattern.n_stored)
-        self.pattern.sum_blocks(self._packed, values)
-        for nodes, packed in self._touching:
-            self.pattern.add_blocks(nodes, packed, values)
-        return values, equations
+        return equations
 
     def _block(self, k: int) -> Floats:
         begin, end = self.pattern.packed_offsets[k : k + 2]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from turgor.common.log import logger
 from turgor.common.optional import is_available, require
-from turgor.solver.linear import solver_in_use
+from turgor.solver.linear import Pardiso, solver_in_use
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -43,7 +43,8 @@ def make_coarse_solver(row_start: Ints, column: Ints, points: Floats, free: NDAr
         return SmoothedAggregation(row_start, column, points, free)
     if n > FACTORISED:
         log.warning("the coarse level has %d unknowns; with the package 'pyamg' it need not be factorised", n)
-    return solver_in_use()(row_start, column)
+    kind = solver_in_use()
+    return Pardiso(row_start, column, single=True) if kind is Pardiso else kind(row_start, column)
 
 
 class SmoothedAggregation:

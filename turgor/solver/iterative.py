@@ -26,7 +26,6 @@ from turgor.fem.pattern import SparsePattern
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.fem.volumes import VolumeEquations
-from turgor.solver.blocks import multiply
 from turgor.solver.krylov import gmres
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.multigrid import TwoLevels
@@ -67,7 +66,7 @@ class Iterative(StiffnessSolver):
         self._levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
         self._system = system
         # Of each free component, in the order of the rows, its number among the unknowns.
-        number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[self._levels.rows.order] - 1
+        number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[self._levels.fine.order] - 1
         self._number: Ints = number[self._levels.free]
         self._direct: LinearSolver | None = None
         self._factorised = False
@@ -81,9 +80,8 @@ class Iterative(StiffnessSolver):
         if self._failures >= FAILURES:
             self._factors()
             return
-        values, equations = system.split_stiffness(state, AUGMENTATION)
-        self._A = self._levels.rows.values(values)
-        self._levels.update(self._A)
+        equations = system.split_stiffness(state, AUGMENTATION, self._levels.fine.layout, self._levels.fine.values)
+        self._levels.update()
         self._volumes = _Volumes(self._levels, equations)
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
@@ -106,6 +104,11 @@ class Iterative(StiffnessSolver):
         return self._factors().negative_pivots if self._factorised else None
 
     def _solution(self, right: Floats, accuracy: float) -> tuple[Floats, Floats] | None:
+        """Return displacements and pressures in the order of the levels, ``None`` if they are not found.
+
+        The method works with a matrix in single precision; a solution that is to be more accurate than that is
+        corrected by what it leaves of the residual in double precision.
+        """
         volumes, n = self._volumes, 3 * len(self._levels.free)
         load = np.zeros(n)
         load[self._levels.free.ravel()] = right[self._number]
@@ -113,33 +116,48 @@ class Iterative(StiffnessSolver):
         lagging = volumes.start
         if np.linalg.norm(load - volumes.forces(lagging)) > np.linalg.norm(load):
             lagging = np.zeros_like(lagging)
-        x, iterations, converged = gmres(
-            self._times,
-            self._precondition,
-            np.concatenate([load, np.zeros(len(lagging))]),
-            np.concatenate([np.zeros(n), lagging]),
-            accuracy,
-            MOST_ITERATIONS,
-        )
-        self.iterations.append(iterations)
-        log.debug("%d iterations of %s", iterations, self.name)
+        x = np.concatenate([np.zeros(n), lagging])
+        residual = np.concatenate([load - volumes.forces(lagging), -volumes.residual(x[:n], lagging)])
+        goal = accuracy * float(np.linalg.norm(residual))
+        count = 0
+        while True:
+            size = float(np.linalg.norm(residual))
+            most = MOST_ITERATIONS - count
+            change, iterations, converged = gmres(self._precondition, residual, max(goal / size, FORCING), most)
+            count += iterations
+            x = x + change
+            if not converged or accuracy >= FORCING:
+                break
+            residual = self._residual(load, x)
+            if float(np.linalg.norm(residual)) <= goal:
+                break
+            converged = float(np.linalg.norm(residual)) < 0.5 * size
+            if not converged:
+                break
+        self.iterations.append(count)
+        log.debug("%d iterations of %s", count, self.name)
         if converged:
             return x[:n], x[n:]
         self._failures += 1
-        log.warning("%s has not converged within %d iterations: factorising", self.name, iterations)
+        log.warning("%s has not converged within %d iterations: factorising", self.name, count)
         return None
 
-    def _times(self, x: Floats) -> Floats:
-        rows, volumes = self._levels.rows, self._volumes
-        n = 3 * len(rows.order)
-        forces = np.empty(n)
-        multiply(rows.start, rows.column, self._A, x[:n], forces)
-        return np.concatenate([forces + volumes.forces(x[n:]), volumes.residual(x[:n], x[n:])])
+    def _residual(self, load: Floats, x: Floats) -> Floats:
+        """Return what displacements and pressures leave of the mixed problem, in double precision."""
+        n = len(load)
+        order, free = self._levels.fine.order, self._levels.free
+        nodal = np.empty((len(order), 3))
+        nodal[order] = x[:n].reshape(-1, 3)
+        forces = (self._system.stiffness_times(nodal)[order] * free).ravel() + self._volumes.forces(x[n:])
+        return np.concatenate([load - forces, -self._volumes.residual(x[:n], x[n:])])
 
-    def _precondition(self, x: Floats) -> Floats:
-        n = 3 * len(self._levels.rows.order)
+    def _precondition(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return what the preconditioner makes of a residual, and the product of the matrix with it."""
+        n = 3 * len(self._levels.free)
         q = self._volumes.pressures(x[n:])
-        return np.concatenate([self._levels.apply(x[:n] - self._volumes.forces(q)), q])
+        forces = self._volumes.forces(q)
+        u, product = self._levels.apply(x[:n] - forces)
+        return np.concatenate([u, q]), np.concatenate([product + forces, self._volumes.residual(u, q)])
 
     def _free_part(self, u: Floats) -> Floats:
         part = np.empty(self._system.n_dofs)
@@ -171,7 +189,7 @@ class _Volumes:
             inverse = np.linalg.inv(factor)
             self._factor.append(factor)
             self._compliance.append(inverse @ compliance @ inverse.swapaxes(1, 2))
-            free = levels.free[levels.rows.rank[eq.nodes]].transpose(0, 2, 1).reshape(m, 1, -1)
+            free = levels.free[levels.fine.rank[eq.nodes]].transpose(0, 2, 1).reshape(m, 1, -1)
             gradients.append(inverse @ (eq.gradient.reshape(m, k, -1) * free))
             rate = eq.bulk @ (eq.volume[:, None] * eq.lag)[:, :, None]
             start.append((factor.swapaxes(1, 2) @ rate).ravel())
@@ -215,7 +233,7 @@ def _gradient_matrix(levels: TwoLevels, equations: list[VolumeEquations], gradie
     data, column, width = [], [], []
     for eq, gradient in zip(equations, gradients, strict=True):
         m, k = eq.lag.shape
-        places = 3 * levels.rows.rank[eq.nodes][:, None, :] + np.arange(3, dtype=np.int32)[:, None]
+        places = 3 * levels.fine.rank[eq.nodes][:, None, :] + np.arange(3, dtype=np.int32)[:, None]
         column.append(np.broadcast_to(places.reshape(m, 1, -1), gradient.shape).ravel())
         data.append(gradient.ravel())
         width.append(np.full(m * k, gradient.shape[2]))

@@ -11,57 +11,56 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Operator = Callable[[Floats], Floats]
+Preconditioner = Callable[[Floats], tuple[Floats, Floats]]
 
 RESTART = 60
 """Directions that are kept; then the method begins anew from where it is."""
 
 
-def gmres(
-    operator: Operator, preconditioner: Operator, right: Floats, start: Floats, accuracy: float, most: int
-) -> tuple[Floats, int, bool]:
-    """Solve a linear system of any symmetry or sign.
+def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: int) -> tuple[Floats, int, bool]:
+    """Solve a linear system of any symmetry or sign, from zero.
 
     Parameters
     ----------
-    operator, preconditioner
-        The matrix and an approximate inverse, as functions of a vector ``(n,)``.
-    right, start
-        Right-hand side and first guess, ``(n,)``.
+    preconditioner
+        Returns the product of an approximate inverse with a vector ``(n,)``, and that of the matrix with this product.
+    right
+        Right-hand side, ``(n,)``.
     accuracy
-        Part of the guess's residual (its norm) at which the solution is good enough.
+        Part of it (its norm) that the solution may leave.
     most
         Iterations allowed.
 
     Returns
     -------
     solution, iterations, converged
-        Of the residual itself, not of its recursion.
+        By the residual itself, not by its recursion.
     """
-    solution, done = start, 0
-    residual = right - operator(start)
-    goal = accuracy * float(np.linalg.norm(residual))
+    solution, residual, done = np.zeros_like(right), right, 0
+    goal = accuracy * float(np.linalg.norm(right))
     while float(np.linalg.norm(residual)) > goal and done < most:
-        change, steps = _cycle(operator, preconditioner, residual, goal, min(RESTART, most - done))
+        change, product, steps = _cycle(preconditioner, residual, goal, min(RESTART, most - done))
         solution, done = solution + change, done + steps
-        before, residual = float(np.linalg.norm(residual)), right - operator(solution)
+        before, residual = float(np.linalg.norm(residual)), residual - product
         if not float(np.linalg.norm(residual)) < before:
             return solution, done, False
     return solution, done, float(np.linalg.norm(residual)) <= goal
 
 
-def _cycle(
-    operator: Operator, preconditioner: Operator, residual: Floats, goal: float, most: int
-) -> tuple[Floats, int]:
-    """Return what lessens the residual to `goal`, or as far as `most` directions reach, and how many were taken."""
+def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: int) -> tuple[Floats, Floats, int]:
+    """Lessen the residual to `goal`, or as far as `most` directions reach.
+
+    Returns the change, the product of the matrix with it, and how many directions were taken.
+    """
     size = float(np.linalg.norm(residual))
-    basis, improved = [residual / size], []
+    basis, improved, products = [residual / size], [], []
     triangle = np.zeros((most, most))
     rotations: list[tuple[float, float]] = []
     target = [size]
     for step in range(most):
-        improved.append(preconditioner(basis[step]))
-        direction = operator(improved[step])
+        found, direction = preconditioner(basis[step])
+        improved.append(found)
+        products.append(direction.copy())
         column = np.zeros(step + 1)
         for _ in range(2):  # once more, so that rounding leaves them orthogonal (Giraud et al. 2005)
             part = np.array([known @ direction for known in basis])
@@ -85,6 +84,10 @@ def _cycle(
         basis.append(direction / length)
     n = len(rotations)
     if n == 0:
-        return np.zeros_like(residual), 1
-    weights = np.linalg.solve(triangle[:n, :n], target[:n])
-    return np.asarray(sum(weight * known for weight, known in zip(weights, improved, strict=False))), n
+        return np.zeros_like(residual), np.zeros_like(residual), 1
+    weights = np.asarray(np.linalg.solve(triangle[:n, :n], target[:n]), float)
+    return _combined(weights, improved), _combined(weights, products), n
+
+
+def _combined(weights: Floats, vectors: list[Floats]) -> Floats:
+    return np.asarray(sum(weight * known for weight, known in zip(weights, vectors, strict=False)))

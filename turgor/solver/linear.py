@@ -112,14 +112,22 @@ class Pardiso(LinearSolver):
     """MKL PARDISO for real symmetric indefinite matrices (Schenk and Gärtner 2004), nested-dissection ordering.
 
     The ordering and the symbolic factorisation are made once; Bunch–Kaufman pivoting gives the inertia for nothing.
+
+    Parameters
+    ----------
+    row_start, column
+        As for :class:`LinearSolver`.
+    single
+        Whether factors and solutions are in single precision, in half of the memory.
     """
 
     name = "MKL PARDISO"
 
-    def __init__(self, row_start: Ints, column: Ints) -> None:
+    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False) -> None:
         library = _mkl()
         assert library is not None
         self._pardiso = library.pardiso
+        self._precision: type[np.floating] = np.float32 if single else np.float64
         self._release: Callable[[], object] = _nothing
         super().__init__(row_start, column)
 
@@ -129,7 +137,7 @@ class Pardiso(LinearSolver):
         self._release = _nothing
         super().take(row_start, column)
         self._handle = np.zeros(64, np.int64)
-        self._values: Floats = np.zeros(len(column))
+        self._values: NDArray[np.floating] = np.zeros(len(column), self._precision)
         self._analysed = False
         # Numbered from zero as in MKL's manual for C; what is not set here is left at zero.
         # Left at zero, iterative refinement runs after perturbed pivots only.
@@ -138,12 +146,13 @@ class Pardiso(LinearSolver):
         control[1] = 3  # nested dissection, in parallel
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
         control[20] = 1  # Bunch–Kaufman pivots
+        control[27] = self._precision is np.float32  # single precision
         control[34] = 1  # indices from zero
         self._control = control
 
     def factorise(self, values: Floats) -> None:
         """Factorise; the first call also orders and analyses the pattern."""
-        self._values = values
+        self._values = np.asarray(values, self._precision)
         if not self._analysed:
             self._call(_ANALYSE)
             self._analysed = True
@@ -156,9 +165,9 @@ class Pardiso(LinearSolver):
 
     def solve(self, right: Floats) -> Floats:
         """Solve with the newest factors."""
-        solution = np.empty_like(right)
-        self._call(_SOLVE, np.ascontiguousarray(right), solution)
-        return solution
+        solution: NDArray[np.floating] = np.empty(len(right), self._precision)
+        self._call(_SOLVE, np.ascontiguousarray(right, self._precision), solution)
+        return np.asarray(solution, float)
 
     @property
     def negative_pivots(self) -> int:
@@ -171,7 +180,9 @@ class Pardiso(LinearSolver):
         ordering, kept, factors = (float(kilobytes) for kilobytes in self._control[14:17])
         return max(ordering, kept + factors) / 2**10
 
-    def _call(self, phase: int, right: Floats | None = None, solution: Floats | None = None) -> None:
+    def _call(
+        self, phase: int, right: NDArray[np.floating] | None = None, solution: NDArray[np.floating] | None = None
+    ) -> None:
         error = _pardiso_call(
             self._pardiso,
             phase,
@@ -200,8 +211,8 @@ def _pardiso_call(
     phase: int,
     handle: NDArray[np.int64],
     control: Ints,
-    matrix: tuple[Floats, Ints, Ints],
-    vectors: tuple[Floats, Floats],
+    matrix: tuple[NDArray[np.floating], Ints, Ints],
+    vectors: tuple[NDArray[np.floating], NDArray[np.floating]],
 ) -> int:
     """Call PARDISO for one symmetric indefinite matrix and one right-hand side; return its error code."""
     values, row_start, column = matrix

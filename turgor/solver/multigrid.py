@@ -2,8 +2,8 @@
 
 One cycle is a symmetric approximate inverse. Its coarse space, the piecewise linear displacements, contains the
 rigid-body modes and nearly the soft bending modes; what it lacks is rough, and one sweep of Gauss–Seidel before and
-after smooths that (Helenbrook, Mavriplis and Atkins 2003). The smoother's matrix is in single precision, which halves
-the memory that goes by: it need not be more accurate than the cycle.
+after smooths that (Helenbrook, Mavriplis and Atkins 2003). The matrix is in single precision, which halves the memory
+that goes by.
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import CHUNKS, parallel
+from turgor.fem.kernels import CHUNKS, jit, parallel
 from turgor.fem.pattern import SparsePattern
 from turgor.mesh.cells import body_cell
-from turgor.solver.blocks import BlockRows, invert_diagonal, multiply, sweep_backward, sweep_forward
+from turgor.solver.blocks import BlockMatrix
 from turgor.solver.coarse import make_coarse_solver
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+
+UNCHANGED = 0.03
+"""The coarse level is kept while the diagonal blocks differ by less than this part from those that it was made of."""
 
 
 class TwoLevels:
@@ -35,66 +39,60 @@ class TwoLevels:
 
     Attributes
     ----------
-    rows
-        The rows of the fine matrix, in whose order of nodes all vectors are.
+    fine
+        The matrix, in whose order of nodes all vectors are.
     free
         Which components are unknown, ``(n_nodes, 3)``.
     """
 
     def __init__(self, pattern: SparsePattern, points: Floats, cells: Ints) -> None:
-        self.rows = BlockRows(pattern)
-        self.free = pattern.free.reshape(-1, 3)[self.rows.order]
-        self._up = corner_interpolation(self.rows.rank[cells])
+        self.fine = BlockMatrix(pattern)
+        self.free = pattern.free.reshape(-1, 3)[self.fine.order]
+        self._up = corner_interpolation(self.fine.rank[cells])
         self._down = self._up.T.tocsr()
-        structure = sp.csr_matrix(
-            (np.ones(len(self.rows.column)), self.rows.column, self.rows.start), shape=(len(self.free),) * 2
-        )
-        coupled = sp.csr_matrix(self._down @ (structure @ self._up))
+        coupled = sp.csr_matrix(self._down @ (self.fine.structure @ self._up))
         coupled.sort_indices()
         self._start, self._column = coupled.indptr.astype(np.int64), coupled.indices.astype(np.int32)
         corners = np.asarray(self._up.argmax(axis=0)).ravel()
         self._coarse_free = self.free[corners]
-        self._coarse = _upper(self._start, self._column)
-        places = points[self.rows.order][corners]
-        self._solver = make_coarse_solver(self._coarse.indptr, self._coarse.indices, places, self._coarse_free)
-        self._inverse = np.empty((len(self.free), 3, 3))
-        self._fine = np.empty(0, np.float32)
+        self._upper, self._known = _upper(self._start, self._column, self._coarse_free)
+        places = points[self.fine.order][corners]
+        self._made_of = np.zeros_like(self.fine.diagonal)
+        self._solver = make_coarse_solver(self._upper.indptr, self._upper.indices, places, self._coarse_free)
 
-    def update(self, values: Floats) -> None:
-        """Take the matrix with these values of its rows.
+    def update(self) -> None:
+        """Take the matrix with the values of :attr:`fine`.
 
         Raises
         ------
         SingularMatrixError
             If the coarse matrix is singular.
         """
-        rows = self.rows
-        self._fine = values.astype(np.float32)
-        invert_diagonal(rows.start, rows.diagonal, values, self._inverse)
+        self.fine.update()
+        change = float(np.linalg.norm(self.fine.diagonal - self._made_of))
+        if change > UNCHANGED * float(np.linalg.norm(self._made_of)):
+            self._update_coarse()
+
+    def _update_coarse(self) -> None:
+        fine, up, down = self.fine, self._up, self._down
         coarse = np.zeros(9 * len(self._column))
         _project(
-            *(rows.start, rows.column, values, self.free.astype(float)),
-            *(self._up.indptr, self._up.indices, self._up.data, self._down.indptr, self._down.indices, self._down.data),
-            *(self._start, self._column, self._coarse_free.astype(float), coarse),
+            *(fine.earlier.start, fine.earlier.column, fine.earlier.values),
+            *(fine.later.start, fine.later.column, fine.later.values, fine.diagonal, self.free),
+            *(up.indptr, up.indices, up.data, down.indptr, down.indices, down.data),
+            *(self._start, self._column, coarse),
         )
-        upper = coarse[self._coarse.data]
-        upper[self._coarse.indptr[:-1]] += ~self._coarse_free.ravel()
+        upper = coarse[self._upper.data] * self._known
+        upper[self._upper.indptr[:-1]] += ~self._coarse_free.ravel()
         self._solver.factorise(upper)
+        self._made_of = fine.diagonal.copy()
 
-    def apply(self, right: Floats) -> Floats:
-        """Return what one cycle makes of a right-hand side ``(3 n_nodes,)``."""
-        rows, fine = self.rows, self._fine
-        x, product = np.zeros_like(right), np.empty_like(right)
-        for odd in (0, 1):
-            sweep_forward(rows.start, rows.column, rows.diagonal, rows.bounds, fine, self._inverse, right, x, odd)
-        multiply(rows.start, rows.column, fine, x, product)
-        rest = (right - product).reshape(-1, 3) * self.free
-        coarse = (self._down @ rest) * self._coarse_free
+    def apply(self, right: Floats) -> tuple[Floats, Floats]:
+        """Return what one cycle makes of a right-hand side ``(3 n_nodes,)``, and the product of the matrix with it."""
+        x, rest = self.fine.sweep_forward(right)
+        coarse = (self._down @ (rest.reshape(-1, 3) * self.free)) * self._coarse_free
         correction = self._up @ self._solver.solve(coarse.ravel()).reshape(-1, 3)
-        x += (correction * self.free).ravel()
-        for odd in (1, 0):
-            sweep_backward(rows.start, rows.column, rows.bounds, fine, self._inverse, right, x, odd)
-        return x
+        return self.fine.sweep_backward(right, x + (correction * self.free).ravel())
 
 
 def corner_interpolation(cells: Ints) -> sp.csr_matrix:
@@ -115,8 +113,11 @@ def corner_interpolation(cells: Ints) -> sp.csr_matrix:
     return sp.csr_matrix((weights[row, at], (row, number[owner[row], at])), shape=(n_nodes, len(corners)))
 
 
-def _upper(start: NDArray[np.int64], column: Ints) -> sp.csr_matrix:
-    """Return the scalar upper triangle of block rows, its values being their places among those of the rows."""
+def _upper(start: NDArray[np.int64], column: Ints, free: NDArray[np.bool_]) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+    """Return the scalar upper triangle of block rows, its values being their places among those of the rows.
+
+    And which of its entries couple free components.
+    """
     count = np.diff(start)
     row = np.repeat(np.arange(len(count)), count)
     block = np.arange(len(column)) - start[row]
@@ -128,14 +129,19 @@ def _upper(start: NDArray[np.int64], column: Ints) -> sp.csr_matrix:
     upper = sp.csr_matrix((places[above], (rows[above], columns[above])), shape=(n, n))
     upper.sort_indices()
     upper.indptr, upper.indices = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
-    return upper
+    is_free = free.ravel()
+    return upper, np.repeat(is_free, np.diff(upper.indptr)) & is_free[upper.indices]
 
 
 @parallel
 def _project(  # type: ignore[no-untyped-def]
-    start,
-    column,
-    values,
+    earlier_start,
+    earlier_column,
+    earlier,
+    later_start,
+    later_column,
+    later,
+    diagonal,
     free,
     up_start,
     up_column,
@@ -145,30 +151,56 @@ def _project(  # type: ignore[no-untyped-def]
     down,
     coarse_start,
     coarse_column,
-    coarse_free,
     out,
 ):
-    """Add the Galerkin product ``Pᵀ A P`` of block rows, free components only, to the coarse block rows `out`."""
-    n = len(coarse_start) - 1
+    """Add the blocks on and above the diagonal of the Galerkin product ``Pᵀ A P`` to the coarse block rows `out`.
+
+    Fixed components are identity in A; what that adds is left out where it is on the diagonal and is nothing elsewhere.
+    """
+    n, n_fine = len(coarse_start) - 1, len(diagonal)
     for chunk in nb.prange(CHUNKS):
         place = np.empty(n, np.int64)
-        block = np.empty((3, 3))
+        own = np.empty(9, np.float32)
         for row in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             width = 3 * (coarse_start[row + 1] - coarse_start[row])
             for m in range(coarse_start[row], coarse_start[row + 1]):
                 place[coarse_column[m]] = 9 * coarse_start[row] + 3 * (m - coarse_start[row])
             for child in range(down_start[row], down_start[row + 1]):
-                a = down_column[child]
-                fine_width = 3 * (start[a + 1] - start[a])
-                for m in range(start[a], start[a + 1]):
-                    b = column[m]
-                    at = 9 * start[a] + 3 * (m - start[a])
-                    for i in range(3):
-                        for k in range(3):
-                            block[i, k] = down[child] * free[a, i] * free[b, k] * values[at + i * fine_width + k]
-                    for parent in range(up_start[b], up_start[b + 1]):
-                        to = place[up_column[parent]]
-                        for i in range(3):
-                            for k in range(3):
-                                weight = up[parent] * coarse_free[row, i] * coarse_free[up_column[parent], k]
-                                out[to + i * width + k] += weight * block[i, k]
+                a, share = down_column[child], down[child]
+                for i in range(3):
+                    for k in range(3):
+                        own[3 * i + k] = diagonal[a, i, k] if free[a, i] and free[a, k] else 0.0
+                parents = (up_start, up_column, up, row, place, width, out)
+                _add_to_parents(share, own, 0, 3, a, *parents)
+                first, last = earlier_start[a], earlier_start[a + 1]
+                for m in range(first, last):
+                    at = 9 * first + 3 * (m - first)
+                    _add_to_parents(share, earlier, at, 3 * (last - first), earlier_column[m], *parents)
+                first, last = later_start[n_fine - 1 - a], later_start[n_fine - a]
+                for m in range(first, last):
+                    at = 9 * first + 3 * (m - first)
+                    _add_to_parents(share, later, at, 3 * (last - first), later_column[m], *parents)
+
+
+@jit
+def _add_to_parents(share, values, at, stride, b, up_start, up_column, up, row, place, width, out):  # type: ignore[no-untyped-def]
+    """Add a fine block at ``values[at]``, of a row that a coarse node has a share in, to the columns of b's parents."""
+    one, two = np.uint64(1), np.uint64(2)
+    r0, r1, r2 = np.uint64(at), np.uint64(at + stride), np.uint64(at + 2 * stride)
+    v00, v01, v02 = share * values[r0], share * values[r0 + one], share * values[r0 + two]
+    v10, v11, v12 = share * values[r1], share * values[r1 + one], share * values[r1 + two]
+    v20, v21, v22 = share * values[r2], share * values[r2 + one], share * values[r2 + two]
+    for parent in range(up_start[b], up_start[b + 1]):
+        coarse = up_column[parent]
+        if coarse >= row:
+            w, to = up[parent], place[coarse]
+            t0, t1, t2 = np.uint64(to), np.uint64(to + width), np.uint64(to + 2 * width)
+            out[t0] += w * v00
+            out[t0 + one] += w * v01
+            out[t0 + two] += w * v02
+            out[t1] += w * v10
+            out[t1 + one] += w * v11
+            out[t1 + two] += w * v12
+            out[t2] += w * v20
+            out[t2 + one] += w * v21
+            out[t2 + two] += w * v22

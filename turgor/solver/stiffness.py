@@ -14,8 +14,11 @@ from turgor.fem.system import System
 
 Floats = NDArray[np.float64]
 
-FORCING = 1e-3
+FORCING = 2e-3
 """Part of the linear problem's residual that one step of Newton's method may leave."""
+
+FORCING_FAR = 1e-2
+"""The same far from an equilibrium, where what the next step mends is larger."""
 
 ACCURATE = 1e-6
 """The same where the solution counts for itself: a compliance, an eigenmode."""

@@ -15,7 +15,7 @@ from turgor.fem.system import System
 from turgor.solver.choice import LinearPath
 from turgor.solver.control import Control
 from turgor.solver.linear import SingularMatrixError
-from turgor.solver.stiffness import ACCURATE, FORCING, Solution, StiffnessSolver
+from turgor.solver.stiffness import ACCURATE, FORCING, FORCING_FAR, Solution, StiffnessSolver
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +64,9 @@ NEAR = 1e-2
 NEARBY = 5e-3
 """A tangent at a relative residual below the first, or at a displacement that differs by less than this part of it,
 speaks for the equilibrium that the iteration then reaches."""
+
+FAR = 0.1
+"""Relative residual above which an equilibrium is far."""
 
 SHARP = 1e-2
 """Newton's last step goes far below the tolerance; steps with a tangent that is used again go on to this part of it, as
@@ -142,7 +145,7 @@ class Tangent:
         """Return Newton's step from the state of the tangent, the `pending` given displacements imposed with it."""
         if pending is not None:
             residual = residual + self.system.free_part(self.system.stiffness_times(pending))
-        found = self.linear.solution(self.system, -residual)
+        found = self.linear.solution(self.system, -residual, FORCING_FAR if self.residual > FAR else FORCING)
         du = found.u if pending is None else found.u + pending
         step = self._controlled(replace(found, u=du), None, self.state, self._fraction)
         self._size = float(np.linalg.norm(step.du))
