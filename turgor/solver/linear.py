@@ -119,14 +119,18 @@ class Pardiso(LinearSolver):
         As for :class:`LinearSolver`.
     single
         Whether factors and solutions are in single precision, in half of the memory.
+    threads
+        Threads to use; ``None`` for as many as MKL is told to.
     """
 
     name = "MKL PARDISO"
 
-    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False) -> None:
+    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False, threads: int | None = None) -> None:
         library = _mkl()
         assert library is not None
         self._pardiso = library.pardiso
+        self._set_threads = library.MKL_Set_Num_Threads_Local
+        self._threads = threads
         self._precision: type[np.floating] = np.float32 if single else np.float64
         self._release: Callable[[], object] = _nothing
         super().__init__(row_start, column)
@@ -183,6 +187,7 @@ class Pardiso(LinearSolver):
     def _call(
         self, phase: int, right: NDArray[np.floating] | None = None, solution: NDArray[np.floating] | None = None
     ) -> None:
+        others = self._set_threads(self._threads) if self._threads else 0
         error = _pardiso_call(
             self._pardiso,
             phase,
@@ -191,6 +196,8 @@ class Pardiso(LinearSolver):
             (self._values, self.row_start, self.column),
             (_EMPTY if right is None else right, _EMPTY if solution is None else solution),
         )
+        if self._threads:
+            self._set_threads(others)
         if error == -2:
             raise SolverError("not enough memory for the factorisation", advice="A coarser mesh needs less")
         if error == -4:
