@@ -9,6 +9,7 @@ from samples import check_assembled, neo_hookean, random_state, shifted
 
 from turgor.common.errors import InputError
 from turgor.fem.loads import Gravity, Pressure, Traction
+from turgor.fem.pattern import SparsePattern
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.system import System
 from turgor.mesh.mesh import Mesh
@@ -150,3 +151,24 @@ def test_materials_must_match_the_regions():
         System(mesh, {}, PLANES)
     with pytest.raises(InputError, match="skin"):
         System(mesh, {"body": neo_hookean(), "skin": neo_hookean()}, PLANES)
+
+
+def test_a_block_that_holds_a_node_twice_adds_both_its_places():
+    nodes = np.array([[0, 2, 2], [1, 0, 2]], np.int32)
+    pattern = SparsePattern(3, 2, [nodes], np.ones(6, bool))
+    rng = np.random.default_rng(0)
+    expected, packed = np.zeros((6, 6)), []
+    for block in nodes:
+        matrix = rng.standard_normal((6, 6))
+        matrix += matrix.T
+        packed.append(matrix[np.triu_indices(6)])
+        places = (2 * block[:, None] + np.arange(2)).ravel()
+        np.add.at(expected, np.ix_(places, places), matrix)
+    for added in (False, True):
+        values = np.zeros(pattern.n_stored)
+        if added:
+            pattern.add_blocks(nodes, np.array(packed), values)
+        else:
+            pattern.sum_blocks(np.concatenate(packed), values)
+        upper = sp.csr_matrix((values, pattern.column, pattern.row_start), shape=(6, 6)).toarray()
+        np.testing.assert_allclose(upper, np.triu(expected), atol=1e-12)
