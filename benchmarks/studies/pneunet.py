@@ -73,7 +73,11 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Found:
-    """What a variant does as far as it goes: bending angle in °, contact in mm², forces in N, pressures in kPa."""
+    """What a variant does as far as it goes: bending angle in °, contact in mm², forces in N, pressures in kPa.
+
+    `overlap` is the largest at any state of the three runs, in parts of the wall, `crossing` the number of states in
+    which the independent look finds surfaces that cross.
+    """
 
     bending: float
     contact: float
@@ -81,6 +85,8 @@ class Found:
     below: float
     reached: tuple[float, float, float]
     elements: int
+    overlap: float
+    crossing: int
 
 
 def finger(variant: Variant, chambers: int = 3) -> tg.PneuNet:
@@ -121,6 +127,20 @@ def measured(variant: Variant, size: str) -> Found:
         below=force(below),
         reached=tuple(float(path.pressure.magnitude[-1]) for path in (free, touching, below)),
         elements=free.mesh.n_cells,
+        overlap=max(most(path, "overlap_per_wall") for path in (free, touching, below)),
+        crossing=sum(crossings(path) for path in (free, touching, below)),
+    )
+
+
+def most(path: tg.Path, fact: str) -> float:
+    """Return the largest value that a fact of any contact has in any state."""
+    return max(float(value) for row in path.history for key, value in row.items() if key.endswith(fact))
+
+
+def crossings(path: tg.Path) -> int:
+    """Return the number of states in which the independent look finds surfaces that cross."""
+    return sum(
+        any(float(value) > 0.0 for key, value in row.items() if key.endswith("intersect")) for row in path.history
     )
 
 
@@ -151,8 +171,11 @@ def cell(value: float, reached: float, digits: int) -> str:
 
 def trends(variants: list[Variant], size: str) -> None:
     """Print the table of variants against the first."""
-    print("| variant | bending, ° | contact, mm² | force, plate touching, N | plate 8 mm below, N | paper | ours | s |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(
+        "| variant | bending, ° | contact, mm² | force, plate touching, N | plate 8 mm below, N | paper | ours | "
+        "overlap, % of the wall | crossing | s |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
     base: Found | None = None
     for variant in [BASE, *variants]:
         begun = time.perf_counter()
@@ -167,7 +190,8 @@ def trends(variants: list[Variant], size: str) -> None:
         forces = f"{cell(found.touching, touching, 3)} | {cell(found.below, below, 3)}"
         print(
             f"| {variant.name} | {cell(found.bending, free, 1)} | {found.contact:.1f} | {forces} | "
-            f"{variant.bending}, {variant.force} | {', '.join(ours)} | {time.perf_counter() - begun:.0f} |",
+            f"{variant.bending}, {variant.force} | {', '.join(ours)} | {100.0 * found.overlap:.2f} | "
+            f"{found.crossing} | {time.perf_counter() - begun:.0f} |",
             flush=True,
         )
 
