@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,34 @@ def test_a_wrong_key_is_named(change: str, words: str, ball: Path) -> None:
     with pytest.raises(tg.InputError) as found:
         checked_mesh(tg.load_case(ball, [change]))
     assert words in str(found.value)
+
+
+def test_a_case_goes_on_behind_the_snap_of_a_balloon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
+    # A Mooney–Rivlin sphere of radii 5 and 6 mm has its limit at 29.12 kPa and jumps (tests/analytic/test_balloons.py).
+    write_deck(shell_octant(5.0, 6.0, 1), tmp_path / "balloon.inp")
+    case = {
+        "geometry": {
+            "template": "mesh",
+            "file": "balloon.inp",
+            "unit": "1 mm",
+            "surfaces": {"cavity": {"ball": {"centre": ["0 mm"] * 3, "radius": "5.01 mm"}}},
+            "tip": ["0 mm", "0 mm", "6 mm"],
+        },
+        "materials": {"body": {"model": "mooney-rivlin", "constants": {"C10": "0.05 MPa", "C01": "0.007 MPa"}}},
+        "supports": [{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
+        "loads": [{"type": "pressure", "value": "30 kPa"}],
+        "solver": {"steps": 1},
+        "control": {"type": "pressure", "at_limit": "post-snap"},
+    }
+    (tmp_path / "balloon.yaml").write_text(yaml.safe_dump(case))
+    done = tg.run(tg.load_case(tmp_path / "balloon.yaml"), tmp_path / "run")
+    with (done.folder / "history.csv").open(encoding="utf-8") as stream:
+        limit, snapped, end = csv.DictReader(stream)
+    assert [row["event"] for row in (limit, snapped, end)] == ["limit-pressure", "post-snap", ""]
+    assert float(limit["pressure_kPa"]) == pytest.approx(29.12, rel=0.01)
+    assert snapped["pressure_kPa"] == limit["pressure_kPa"]
+    # Inner stretch 4.198: the outer radius is the cube root of 6³ + 5³ (4.198³ − 1).
+    assert float(snapped["tip_displacement_z_mm"]) == pytest.approx(21.06 - 6.0, rel=0.05)
+    assert float(end["pressure_kPa"]) == pytest.approx(30.0, rel=1e-9)
+    assert done.summary["outcome"] == "target-reached"
