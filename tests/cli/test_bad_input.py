@@ -45,6 +45,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "family-angle-of-length.yaml": ("fibre_families.0.direction.angle", "not a unit of angle"),
     "family-of-unknown-law.yaml": ("fibre_families.0.law.type", "cubic", "quadratic"),
     "family-too-dispersed.yaml": ("fibre_families.0.dispersion", "0.5", "less than or equal"),
+    "fibre-bending-in-mm.yaml": ("fibres.0.bending_stiffness", "not a unit of bending stiffness", "20 N mm^2"),
     "fibre-modulus-in-mm.yaml": ("fibres.0.youngs_modulus", "not a unit of pressure"),
     "fibre-of-no-diameter.yaml": ("fibres.0.diameter", "greater than 0"),
     "fibre-without-curve.yaml": ("fibres.0.curve", "no curves"),

@@ -130,7 +130,7 @@ STANDING = {
                   "torque_N_mm": [1.0, 0.0, 0.0]},
     },
     "fibres": {"one": {"largest_tension_N": 2.0, "largest_strain": 1e-4},
-               "two": {"largest_tension_N": 1.0, "largest_strain": 3e-4}},
+               "two": {"largest_tension_N": 1.0, "largest_strain": 3e-4, "largest_moment_N_mm": 5.0}},
 }  # fmt: skip
 
 
@@ -146,6 +146,7 @@ def test_contacts_and_fibres_have_columns_of_their_own(small_finger: Mesh) -> No
     assert entry["fibre_largest_tension_N"] == 2.0
     assert entry["fibre_largest_strain"] == 3e-4
     assert entry["fibre_two_largest_tension_N"] == 1.0
+    assert entry["fibre_largest_moment_N_mm"] == entry["fibre_two_largest_moment_N_mm"] == 5.0  # the first bends freely
 
 
 def _fields(record: StepRecord) -> dict[str, object]:

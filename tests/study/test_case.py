@@ -68,8 +68,13 @@ contact:
     - {type: cylinder, start: [0 mm, 9 cm, 0 mm], end: [0 mm, 9 cm, 1 cm], radius: 0.1 in, name: bar}
     - {type: sphere, centre: [9 cm, 0 mm, 0 mm], radius: 0.3 in}
 fibres:
-  - {youngs_modulus: 4506 ksi, diameter: 7 thou}
-  - {curve: fibre-1, youngs_modulus: 31 GPa, diameter: 0.1 mm, tension_only: false, bar_length: 0.1 in}
+  - {youngs_modulus: 4506 ksi, diameter: 7 thou, bending_stiffness: solid}
+  - curve: fibre-1
+    youngs_modulus: 31 GPa
+    diameter: 0.1 mm
+    tension_only: false
+    bar_length: 0.1 in
+    bending_stiffness: 0.003 pound_force*inch^2
 sheets:
   - {surface: outer, youngs_modulus: 1 GPa, thickness: 4 thou, poisson: 0.25}
   - {between: [body, base], youngs_modulus: 1 GPa, thickness: 4 thou}

@@ -28,6 +28,7 @@ INTERNAL_UNITS: dict[str, str] = {
     "compliance": "1/MPa",
     "force": "N",
     "stiffness": "N/mm",
+    "bending stiffness": "N mm^2",
     "foundation": "N/mm^3",
     "density": "t/mm^3",
     "acceleration": "mm/s^2",
@@ -50,6 +51,7 @@ EXAMPLES: dict[str, str] = {
     "compliance": "30 1/MPa",
     "force": "1.5 N",
     "stiffness": "0.5 N/mm",
+    "bending stiffness": "20 N mm^2",
     "foundation": "0.01 N/mm^3",
     "density": "1070 kg/m^3",
     "acceleration": "9.81 m/s^2",
@@ -191,6 +193,7 @@ Pressure = quantity_type("pressure")
 PositivePressure = quantity_type("pressure", 0.0, exclusive=True)
 Force = quantity_type("force")
 Stiffness = quantity_type("stiffness", 0.0, exclusive=True)
+BendingStiffness = quantity_type("bending stiffness", 0.0, exclusive=True)
 Foundation = quantity_type("foundation", 0.0, exclusive=True)
 Density = quantity_type("density", 0.0, exclusive=True)
 Acceleration = quantity_type("acceleration")

@@ -43,6 +43,8 @@ class Fibre:
         Whether it goes slack instead of carrying compression, as a thread does.
     bar_length
         Longest bar, mm; ``None`` for half the mean edge of the cells that the fibre passes.
+    bending_stiffness
+        E I in N mm²; ``None`` for a fibre that bends freely. :func:`solid_bending_stiffness` gives that of a wire.
     """
 
     curve: str
@@ -50,6 +52,7 @@ class Fibre:
     diameter: float
     tension_only: bool = True
     bar_length: float | None = None
+    bending_stiffness: float | None = None
 
     @property
     def axial_stiffness(self) -> float:
@@ -57,8 +60,15 @@ class Fibre:
         return 0.25 * np.pi * self.youngs_modulus * self.diameter**2
 
 
+def solid_bending_stiffness(youngs_modulus: float, diameter: float) -> float:
+    """Return E I of a solid round section, I = π d⁴/64, in N mm²."""
+    return np.pi / 64.0 * youngs_modulus * diameter**4
+
+
 class EmbeddedFibre(Mixed):
     """½ E A Σ ε² L over straight bars, ε = l/L − 1, whose ends move with the cells that they lie in.
+
+    How the bars resist bending against each other is a term of its own, :class:`turgor.fem.bending.FibreBending`.
 
     The ends' displacement is interpolated by the shape functions of their host cells (Phillips and Zienkiewicz 1976;
     Elwi and Hrudey 1989), so that the mesh need not know of the fibre. What lags is the axial force of every
@@ -83,10 +93,17 @@ class EmbeddedFibre(Mixed):
             raise InputError("fibres need a body in space, not a plane section", key=f"fibres.{fibre.curve}")
         self.fibre = fibre
         self.ends = _bar_ends(mesh, fibre)
-        cell, local = locate(mesh.points, mesh.cells, self.ends, f"curves.{fibre.curve}")
-        self.nodes, self._share = _end_differences(mesh.cells[cell], mesh.cell.shape(local), mesh.n_points)
+        self.hosts, self.local = locate(mesh.points, mesh.cells, self.ends, f"curves.{fibre.curve}")
+        ends = nodal_shares(mesh.cells[self.hosts], mesh.cell.shape(self.local), mesh.n_points)
+        self.bars = (ends[1:] - ends[:-1]).tocsr()
+        self.nodes, (self._share,) = in_blocks(self.bars)
         self._span = self._difference(mesh.points)
         self.length = np.linalg.norm(self._span, axis=1)
+
+    @property
+    def resists_bending(self) -> bool:
+        """Whether it has bending stiffness, and a joint where that acts: a single bar has none."""
+        return self.fibre.bending_stiffness is not None and len(self.length) > 1
 
     def strain(self, u: Floats) -> Floats:
         """Return the engineering strain l/L − 1 of every bar at displacement `u`, ``(n_bars,)``."""
@@ -150,7 +167,7 @@ class EmbeddedFibre(Mixed):
 
 def _bar_ends(mesh: Mesh, fibre: Fibre) -> Floats:
     """Return the ends of the bars ``(n_bars + 1, 3)``: along the curve at equal distances, corners kept."""
-    for key in ("youngs_modulus", "diameter", "bar_length"):
+    for key in ("youngs_modulus", "diameter", "bar_length", "bending_stiffness"):
         value = getattr(fibre, key)
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise InputError("this must be positive", key=f"fibres.{fibre.curve}.{key}", value=value)
@@ -178,28 +195,43 @@ def _mean_edge(mesh: Mesh, curve: Floats, name: str) -> float:
     return float(np.linalg.norm(edges, axis=2).mean())
 
 
-def _end_differences(hosts: Ints, shape: Floats, n_points: int) -> tuple[Ints, Floats]:
-    """Return, for each bar, the nodes that move its ends and each one's share in (second end − first end).
+def nodal_shares(cells: Ints, shares: Floats, n_points: int) -> sp.csr_matrix:
+    """Return the matrix ``(n, n_points)`` of quantities of which each node of ``cells (n, m)`` has its share."""
+    start = np.arange(0, cells.size + 1, cells.shape[1])
+    return sp.csr_matrix((shares.ravel(), cells.ravel(), start), shape=(len(cells), n_points))
 
-    `hosts` and `shape` ``(n_ends, n_nodes)`` describe the ends. The results are ``(n_bars, width)``;
-    bars with fewer nodes repeat one of them with share zero.
+
+def in_blocks(*quantities: sp.csr_matrix) -> tuple[Ints, Floats]:
+    """Return the nodes that move any of some quantities, and their shares in each of them.
+
+    Parameters
+    ----------
+    quantities
+        Matrices ``(n, n_points)`` of shares; row i of all of them makes block i.
+
+    Returns
+    -------
+    nodes, shares
+        ``(n, width)`` and ``(n_quantities, n, width)``; blocks of fewer nodes repeat one of them with shares zero.
     """
-    ends = sp.csr_matrix(
-        (shape.ravel(), hosts.ravel(), np.arange(0, hosts.size + 1, hosts.shape[1])), shape=(len(hosts), n_points)
-    )
-    share = (ends[1:] - ends[:-1]).tocsr()
-    # A node of the face, edge or corner opposite to which an end lies has no share in it but rounding.
-    share.data[np.abs(share.data) < 1e-10] = 0.0
-    share.eliminate_zeros()
-    share.sort_indices()
-    count = np.diff(share.indptr)
-    row = np.repeat(np.arange(len(count)), count)
-    slot = np.arange(share.nnz) - share.indptr[row]
-    nodes = np.repeat(share.indices[share.indptr[:-1], None], count.max(), axis=1).astype(np.int32)
-    values = np.zeros(nodes.shape)
-    nodes[row, slot] = share.indices
-    values[row, slot] = share.data
-    return nodes, values
+    kept = []
+    for quantity in quantities:
+        # A node of the face, edge or corner opposite to which an end lies has no share in it but rounding.
+        entries = quantity.tocoo()
+        large = np.abs(entries.data) >= 1e-10 * np.abs(entries.data).max()
+        kept.append((entries.row[large], entries.col[large], entries.data[large]))
+    n, n_points = quantities[0].shape
+    keys = [row.astype(np.int64) * n_points + col for row, col, _ in kept]
+    places = np.unique(np.concatenate(keys))
+    row = places // n_points
+    count = np.bincount(row, minlength=n)
+    first = np.cumsum(count) - count
+    nodes = np.repeat((places[first] % n_points)[:, None], count.max(), axis=1).astype(np.int32)
+    nodes[row, np.arange(len(places)) - first[row]] = places % n_points
+    shares = np.zeros((len(quantities), *nodes.shape))
+    for share, key, (at, _, values) in zip(shares, keys, kept, strict=True):
+        share[at, np.searchsorted(places, key) - first[at]] = values
+    return nodes, shares
 
 
 @parallel

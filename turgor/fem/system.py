@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
+from turgor.fem.bending import FibreBending
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
@@ -102,10 +103,11 @@ class System:
         caps = [cap for cavity in self.cavities for cap in cavity.caps]
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
+        self.bending = [FibreBending(mesh, embedded) for embedded in self.fibres if embedded.resists_bending]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
         self.contacts = [self._contact(materials, case, number) for number, case in enumerate(contact)]
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
-        embedded: tuple[Term, ...] = (*self.fibres, *self.membranes, *self.families)
+        embedded: tuple[Term, ...] = (*self.fibres, *self.bending, *self.membranes, *self.families)
         self.terms: tuple[Term, ...] = (
             *self.solids,
             *self.cavities,

@@ -20,6 +20,7 @@ _KINDS = (
     ("Contact", "contact_", "_area_mm2", "Area in contact / mm²"),
     ("Fibres", "fibre_", "largest_tension_N", "Largest tension / N"),
     ("Fibres", "fibre_", "largest_strain", "Largest strain"),
+    ("Fibres", "fibre_", "largest_moment_N_mm", "Largest bending moment / N mm"),
     ("Interfaces", "interface_", "_traction_max_MPa", "Largest traction / MPa"),
     ("Interfaces", "interface_", "_traction_mean_MPa", "Mean traction / MPa"),
 )

@@ -105,10 +105,10 @@ def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
 
 
 def _fibres(standing: Mapping[str, Mapping[str, Any]]) -> Row:
-    """The largest tension and strain of all fibres and, where there are several, of each."""
+    """The largest tension, strain and bending moment of all fibres and, where there are several, of each."""
     columns: Row = {}
-    for key in next(iter(standing.values()), {}):
-        columns[f"fibre_{key}"] = max(float(facts[key]) for facts in standing.values())
+    for key in dict.fromkeys(key for facts in standing.values() for key in facts):
+        columns[f"fibre_{key}"] = max(float(facts[key]) for facts in standing.values() if key in facts)
     if len(standing) > 1:
         for name, facts in standing.items():
             columns |= {f"fibre_{name}_{key}": float(value) for key, value in facts.items()}

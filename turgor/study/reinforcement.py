@@ -6,10 +6,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from turgor.common.units import Angle, PositiveLength, PositivePressure
+from turgor.common.units import Angle, BendingStiffness, PositiveLength, PositivePressure
 from turgor.fem import directions
 from turgor.fem.anisotropic import ExponentialFibres, FibreFamily, QuadraticFibres
-from turgor.fem.fibres import Fibre
+from turgor.fem.fibres import Fibre, solid_bending_stiffness
 from turgor.fem.membrane import Membrane
 from turgor.geometry.space import Place
 from turgor.mesh import Mesh
@@ -25,12 +25,19 @@ class FibreCase(StrictModel):
     diameter: PositiveLength
     tension_only: bool = Field(default=True, strict=True, description="false: it carries compression too")
     bar_length: PositiveLength | None = Field(default=None, description="left out, half of an element")
+    bending_stiffness: BendingStiffness | Literal["solid"] | None = Field(
+        default=None, description="E I, or `solid` for that of a round wire; left out, it bends freely"
+    )
 
     def build(self, mesh: Mesh) -> list[Fibre]:
         """Return the fibres on the curves of the mesh."""
         curves = list(mesh.curves) if self.curve is None else [self.curve]
+        bending = self.bending_stiffness
+        if bending == "solid":
+            bending = solid_bending_stiffness(self.youngs_modulus, self.diameter)
         return [
-            Fibre(curve, self.youngs_modulus, self.diameter, self.tension_only, self.bar_length) for curve in curves
+            Fibre(curve, self.youngs_modulus, self.diameter, self.tension_only, self.bar_length, bending)
+            for curve in curves
         ]
 
 

@@ -126,15 +126,18 @@ def standing(
         ``contact``: by its name, area, overlap or by a barrier the smallest gap (also in parts of the wall behind
         it; ``None`` beyond the barrier's reach), and what a rigid body feels;
         of the body with itself, where the IPC Toolkit is installed, whether more than 1 % of the wall overlaps;
-        ``fibres``: by its curve, the largest tension and strain; ``interfaces``: by its regions, the traction;
+        ``fibres``: by its curve, the largest tension and strain, and bending moment where it resists bending;
+        ``interfaces``: by its regions, the traction;
         ``supports``: by its surface, force and torque on the body.
     """
+    moments = {term.fibre.curve: float(term.moment(state.u).max()) for term in system.bending}
     found = {
         "contact": {contact.name: _touch(contact, state) for contact in system.contacts},
         "fibres": {
             embedded.fibre.curve: {
                 "largest_tension_N": float(embedded.tension(state.u).max()),
                 "largest_strain": float(embedded.strain(state.u).max()),
+                **({"largest_moment_N_mm": moments[curve]} if (curve := embedded.fibre.curve) in moments else {}),
             }
             for embedded in system.fibres
         },
