@@ -119,8 +119,8 @@ def test_a_bent_wire_is_straightened_and_bent_the_other_way_by_the_same_moments(
 
 
 def test_the_curvature_of_a_ring_keeps_its_direction_in_the_section():
-    # Half a turn of every section about the centre line, as of a rubber ring that is everted, turns k₀ round: the moment
-    # is E I · 2 / R, though the centre line is where it was. A mirror does the same to the line that carries k₀.
+    # Half a turn of every section about the centre line, as of a rubber ring that is everted, turns k₀ round: the
+    # moment is E I · 2 / R, though the centre line is where it was. A mirror does the same to the line that carries k₀.
     radius = 2.0
     mesh = box((5.0, 5.0, 1.0), (6, 6, 2), "hex27")
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
