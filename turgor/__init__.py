@@ -1,7 +1,7 @@
 """Turgor: from a tensile test and a shape to the motion of a soft pneumatic actuator.
 
-The names below are the public ones. Each is loaded when first used, so that ``import turgor`` is quick, loads
-no heavy package and acts on nothing.
+The names below are the public ones. Each is loaded when first used, so that ``import turgor`` is quick and loads no
+heavy package. All that it does is to tell numba where the compiled kernels of these sources are.
 
 >>> import turgor as tg
 >>> tg.CappedTube(length="90 mm").length
@@ -12,7 +12,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import pathlib
 from typing import TYPE_CHECKING, Any
+
+from turgor.common.compiled import keep_kernels_by_source
+
+keep_kernels_by_source(pathlib.Path(__file__).parent)
 
 if TYPE_CHECKING:
     from turgor.common.errors import InputError, MissingPackageError, SolverError, TurgorError

@@ -1,0 +1,44 @@
+"""Kept kernels are those of the sources as they are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+import turgor
+from turgor.common.compiled import UNUSED_S, VARIABLE, keep_kernels_by_source, kernels_of
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "kernel.py").write_text("import numba as nb\n")
+    (tmp_path / "plain.py").write_text("import numpy\n")
+    return tmp_path
+
+
+def test_a_change_of_any_kernel_source_begins_anew_and_of_others_does_not(package: Path) -> None:
+    keep_kernels_by_source(package)
+    first = os.environ.pop(VARIABLE)
+    assert Path(first).is_dir()
+    (package / "plain.py").write_text("import numpy as np\n")
+    assert kernels_of(package) == Path(first)
+    (package / "inner" / "kernel.py").write_text("import numba as nb  # changed\n")
+    os.utime(first, (0, os.stat(first).st_mtime - 2 * UNUSED_S))
+    keep_kernels_by_source(package)
+    assert os.environ[VARIABLE] != first
+    assert not Path(first).exists()
+
+
+def test_the_users_place_is_kept(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "/elsewhere")
+    keep_kernels_by_source(package)
+    assert os.environ[VARIABLE] == "/elsewhere"
+    assert not list(package.rglob("kernels-*"))
+
+
+def test_turgor_itself_has_such_a_place() -> None:
+    assert Path(os.environ[VARIABLE]) == kernels_of(Path(turgor.__file__).parent)
