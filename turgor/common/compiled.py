@@ -20,7 +20,7 @@ UNUSED_S = 86_400.0
 def keep_kernels_by_source(package: Path) -> None:
     """Let numba keep the kernels of a package under a name that follows from their sources.
 
-    Without effect where the user has chosen a place, and the package cannot be written to: numba then
+    Without effect where the user has chosen a place, and where the package cannot be written to: numba then
     finds a place itself.
     """
     if VARIABLE in os.environ or not os.access(package, os.W_OK):
