@@ -86,8 +86,13 @@ def compile_constraints(
     fixed = np.zeros(mesh.points.shape, bool)
     values = np.zeros(mesh.points.shape)
     nodes, frames = [], []
+    known: dict[tuple[tuple[bytes, float], ...], tuple[Floats, Floats]] = {}
     for node, conditions in rows.items():
-        basis, given = _independent(conditions, mesh.points[node])
+        # Most nodes of a surface are held alike.
+        key = tuple((direction.tobytes(), wanted) for direction, wanted, _ in conditions)
+        if key not in known:
+            known[key] = _independent(conditions, mesh.points[node])
+        basis, given = known[key]
         axes = np.argmax(np.abs(basis), axis=1)
         if np.allclose(np.abs(basis[np.arange(len(basis)), axes]), 1.0, atol=1e-12):
             fixed[node, axes] = True

@@ -31,10 +31,15 @@ def host_cells(cells: Ints, faces: Ints) -> Ints:
     """
     if faces.size == 0:
         return np.zeros(0, dtype=np.int32)
-    own, wanted = _rotated(all_faces(cells)), _rotated(faces)
+    # Of the many faces of all cells few have nothing but nodes of these.
+    marked = np.zeros(max(int(cells.max()), int(faces.max())) + 1, np.bool_)
+    marked[faces] = True
+    of_cells = all_faces(cells)
+    near = np.flatnonzero(marked[of_cells].all(axis=1))
+    own, wanted = _rotated(of_cells[near]), _rotated(faces)
     _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
     owner = np.full(inverse.max() + 1, -1, dtype=np.int32)
-    owner[inverse[: len(own)]] = np.arange(len(own)) // len(body_cell(cells).faces)
+    owner[inverse[: len(own)]] = near // len(body_cell(cells).faces)
     return owner[inverse[len(own) :]]
 
 
