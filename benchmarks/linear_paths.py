@@ -16,24 +16,20 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from turgor.fem.loads import Pressure
-from turgor.fem.supports import Clamped
-from turgor.fem.system import System
-from turgor.materials.models.neo_hookean import NeoHookean
-from turgor.materials.volumetric import Quadratic
-from turgor.mesh.mesh import Mesh
 from turgor.solver import iterative
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.newton import NewtonOptions, find_equilibrium
 
 sys.path.insert(0, str(Path(__file__).parent / "peers"))
-from case_t import MU, PRESSURE, TubeMesh
+from case import Case
+from cases import tube
 from measure import cpu_s, peak_memory_MB
-from with_turgor import body_of, tube_mesh
+from with_turgor import system_of
 
 PATHS = ("direct", "iterative")
 WARM_UP = 6.0
@@ -45,18 +41,17 @@ HEAD = """\
 def saved(size: float, folder: Path) -> Path:
     """Mesh the tube at an element size in mm and store it."""
     path = folder / f"{size}.npz"
-    tube_mesh(size).save(path)
+    tube(size).save(path)
     return path
 
 
-def solve(mesh: Mesh, path: str, ratio: float) -> dict[str, object]:
+def solve(case: Case, path: str, ratio: float) -> dict[str, object]:
     """Bring case T to its pressure in one step; return what was counted and where the furthest node went."""
-    rubber = NeoHookean(C10=MU / 2, volumetric=Quadratic(ratio * MU))
-    system = System(mesh, {"body": rubber}, [Clamped("mount")], [Pressure("cavity", PRESSURE)])
+    system = system_of(replace(case, bulk=ratio * case.mu))
     solver = make_stiffness_solver(system, path)
     end = find_equilibrium(system, solver, system.reference_state(), 1.0, NewtonOptions())
     return {
-        "tetrahedra": mesh.n_cells,
+        "tetrahedra": len(case.cells),
         "unknowns": system.n_dofs,
         "newton": end.factorisations,
         "inner": getattr(solver, "iterations", []),
@@ -67,11 +62,11 @@ def solve(mesh: Mesh, path: str, ratio: float) -> dict[str, object]:
 def worker(path: str, ratio: float, augmentation: float, warm_up: Path, mesh: Path) -> None:
     """Run one path on one mesh and print one line of JSON."""
     iterative.AUGMENTATION = augmentation
-    solve(body_of(TubeMesh.load(warm_up)), path, ratio)
-    body = body_of(TubeMesh.load(mesh))
+    solve(Case.load(warm_up), path, ratio)
+    case = Case.load(mesh)
 
     wall, cpu = time.perf_counter(), cpu_s()
-    found = solve(body, path, ratio)
+    found = solve(case, path, ratio)
     wall, cpu = time.perf_counter() - wall, cpu_s() - cpu
     print(json.dumps(found | {"wall": wall, "cpu": cpu, "memory": peak_memory_MB()}))
 

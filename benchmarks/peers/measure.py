@@ -1,32 +1,61 @@
-"""What every adapter does around its solver: warm up, start the clocks, solve, print one line of JSON."""
+"""What every adapter shares: when Newton's method has arrived; warm up, start the clocks, solve, print JSON."""
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
-from case_t import TubeMesh
+from case import MOST_ITERATIONS, TOLERANCE, VOLUME_TOLERANCE, Case
 
 
 @dataclass(frozen=True)
 class Solved:
     """What a code says of its equilibrium.
 
-    ``tip`` is the displacement of the tip node, mm; `unknowns` the size of the linear system; `version` the code's.
+    ``tip`` is the displacement of the tip node, mm; `work` that of the forces at the supports along the displacements
+    given there, N mm; `unknowns` the size of the linear system; `version` the code's.
     """
 
-    tip: tuple[float, float, float]
+    tip: tuple[float, ...]
+    work: float
     unknowns: int
     iterations: int
     factorisations: int
     settings: str
     version: str
+
+
+class Newton:
+    """When the benchmark's Newton iteration has arrived, told after each evaluation of the residual."""
+
+    def __init__(self, case: Case) -> None:
+        self.iterations = -1
+        self._loaded = case.has_cavity
+        self._load = 0.0
+
+    def arrived(self, imbalance: float, forces: float, gap: float = 0.0) -> bool:
+        """Say whether the state is an equilibrium; raise SystemExit if none is to be expected.
+
+        `imbalance` is the norm of the residual where displacements are free, `forces` that where they are held too,
+        `gap` that of the volume's residual over its parts. The load is the pressure's nodal forces, the only ones at
+        rest; where there is none, what the supports carry.
+        """
+        self.iterations += 1
+        if self.iterations == 0 or not self._loaded:
+            self._load = forces
+        if self.iterations and imbalance <= TOLERANCE * self._load and gap <= VOLUME_TOLERANCE:
+            return True
+        if self.iterations == MOST_ITERATIONS or not math.isfinite(imbalance):
+            raise SystemExit(f"no equilibrium in {self.iterations} iterations, imbalance {imbalance / self._load:.2g}")
+        return False
 
 
 class Alone:
@@ -41,7 +70,7 @@ class Alone:
         """Wait for nobody."""
 
 
-def run(solve: Callable[[TubeMesh], Solved], comm: Alone | Any = None, *, warm_up: bool = True) -> None:
+def run(solve: Callable[[Case], Solved], comm: Alone | Any = None, *, warm_up: bool = True) -> None:
     """Solve the mesh named first on the command line; the one named second, if any, only warms the code up.
 
     The clocks run from the mesh in memory to the displacement in memory: set-up is in, imports, compilation and what
@@ -49,8 +78,8 @@ def run(solve: Callable[[TubeMesh], Solved], comm: Alone | Any = None, *, warm_u
     """
     comm = comm or Alone()
     if warm_up and len(sys.argv) > 2:
-        solve(TubeMesh.load(sys.argv[2]))
-    mesh = TubeMesh.load(sys.argv[1])
+        solve(Case.load(sys.argv[2]))
+    mesh = Case.load(sys.argv[1])
     comm.barrier()
     wall, cpu = time.perf_counter(), cpu_s()
     solved = solve(mesh)
@@ -69,4 +98,7 @@ def cpu_s() -> float:
 
 def peak_memory_MB() -> float:
     """Return the largest resident memory so far of this process or one it waited for."""
-    return max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
+    # The kernel's account of this process starts with what the one that started it had: its own image tells its own.
+    image = dict(line.split(":") for line in Path("/proc/self/status").read_text().splitlines())
+    own = int(image["VmHWM"].split()[0])
+    return max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024

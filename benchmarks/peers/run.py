@@ -1,10 +1,11 @@
-"""The same tube in Turgor and in its peers: one table.
+"""The same case in Turgor and in its peers: one table.
 
-    .venv/bin/python benchmarks/peers/run.py [--sizes 5 3 2] [--peers turgor felupe …] [--repeat 5]
+    .venv/bin/python benchmarks/peers/run.py [--case tube|punch|bellows] [--sizes 5 3 2] [--peers turgor felupe …]
+        [--repeat 5]
 
 Run `sh benchmarks/peers/install.sh` once before. Every run is a process of its own in the peer's own environment; the
-first small mesh warms it up before the clocks start. Each run's figures go to ``results/peers.jsonl`` beside this file,
-and the table of their medians to standard output and ``results/peers.md``.
+first small mesh warms it up before the clocks start. Each run's figures go to ``results/CASE.jsonl`` beside this file,
+and the table of their medians to standard output and ``results/CASE.md``.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from case_t import TubeMesh
-from with_turgor import tube_mesh
+from case import Case
+from cases import CASES
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"
@@ -34,7 +35,7 @@ ONCE_S = 120
 
 @dataclass(frozen=True)
 class Peer:
-    """A code: the environment under .peers that it lives in (none: that of this process), and how it is called."""
+    """A code: the environment under .peers that it lives in (none: that of this process), its call, its cases."""
 
     title: str
     script: str
@@ -42,6 +43,7 @@ class Peer:
     ranks: int = 1
     arguments: tuple[str, ...] = ()
     program: str | None = None
+    cases: tuple[str, ...] = tuple(CASES)
 
     def missing(self) -> str | None:
         """Return why the peer cannot run, ``None`` if it can."""
@@ -62,30 +64,33 @@ class Peer:
 
 PEERS = {
     "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",)),
-    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",)),
-    "felupe": Peer("FElupe", "with_felupe.py", "felupe"),
+    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=("tube",)),
+    "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",)),
+    "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
     "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve"),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),
     "dolfinx-p2p1": Peer("DOLFINx, P2–P1", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P1",)),
-    "calculix": Peer("CalculiX", "with_calculix.py", program="ccx"),
+    "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
 }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", nargs="+", type=float, default=[5.0, 3.0, 2.0], help="edge lengths, mm")
-    parser.add_argument("--peers", nargs="+", choices=PEERS, default=list(PEERS))
+    parser.add_argument("--case", choices=CASES, default="tube")
+    parser.add_argument("--sizes", nargs="+", type=float, help="edge lengths, mm")
+    parser.add_argument("--peers", nargs="+", choices=PEERS, help="those of them that can solve the case")
     parser.add_argument("--repeat", type=int, default=5, help="runs of which the median is taken")
     asked = parser.parse_args()
     RESULTS.mkdir(exist_ok=True)
-    sizes = sorted(asked.sizes, reverse=True)
-    meshes = [export(size) for size in sizes]
+    peers = [name for name in asked.peers or PEERS if asked.case in PEERS[name].cases]
+    sizes = sorted(asked.sizes or CASES[asked.case].sizes, reverse=True)
+    meshes = [export(asked.case, size) for size in sizes]
     rows: dict[tuple[str, float], list[dict[str, object]]] = {}
-    with (RESULTS / "peers.jsonl").open("w") as log:
+    with (RESULTS / f"{asked.case}.jsonl").open("w") as log:
         # Round after round, so that a disturbance of the machine meets all alike.
         for _ in range(asked.repeat):
             for size, mesh in zip(sizes, meshes, strict=True):
-                for name in asked.peers:
+                for name in peers:
                     runs = rows.setdefault((name, size), [])
                     if runs and ("failure" in runs[-1] or float(runs[-1]["wall_s"]) > ONCE_S):
                         continue
@@ -94,15 +99,15 @@ def main() -> None:
                     log.write(json.dumps({"peer": name, "size_mm": size} | result) + "\n")
                     log.flush()
                     print(name, size, result.get("wall_s", result.get("failure")), file=sys.stderr)
-    text = table(asked.peers, sizes, meshes, rows)
-    (RESULTS / "peers.md").write_text(text)
+    text = table(peers, sizes, meshes, rows)
+    (RESULTS / f"{asked.case}.md").write_text(text)
     print(text)
 
 
-def export(size: float) -> Path:
-    """Mesh case T and write it as plain arrays."""
-    path = RESULTS / f"case-t-{size:g}mm.npz"
-    tube_mesh(size).save(path)
+def export(name: str, size: float) -> Path:
+    """Mesh a case and write it as plain arrays."""
+    path = RESULTS / f"{name}-{size:g}mm.npz"
+    CASES[name].make(size).save(path)
     return path
 
 
@@ -127,7 +132,7 @@ def measured(peer: Peer, mesh: Path, warm_up: Path) -> dict[str, object]:
 HEAD = (
     "code",
     "settings",
-    "tetrahedra",
+    "cells",
     "unknowns",
     "runs",
     "wall, s",
@@ -135,8 +140,6 @@ HEAD = (
     "peak memory, MB",
     "iterations",
     "factorisations",
-    "tip, mm",
-    "off Turgor's",
     "wall ∝ nᵏ, k",
 )
 
@@ -148,19 +151,25 @@ def table(
     rows: dict[tuple[str, float], list[dict[str, object]]],
 ) -> str:
     """Return the Markdown table of medians."""
-    counts = [len(TubeMesh.load(mesh).cells) for mesh in meshes]
-    lines = ["| " + " | ".join(HEAD) + " |", "|---|---" + "|--:" * (len(HEAD) - 2) + "|"]
+    cases = [Case.load(mesh) for mesh in meshes]
+    compared = {"tip": ("tip, mm", 1.0)}
+    if travel := cases[0].travel:
+        compared["work"] = ("force, N", 1.0 / travel)
+    head = [*HEAD, *(title for first, _ in compared.values() for title in (first, "off Turgor's"))]
+    lines = ["| " + " | ".join(head) + " |", "|---|---" + "|--:" * (len(head) - 2) + "|"]
     for name in names:
         walls: list[tuple[int, float]] = []
-        for size, count in zip(sizes, counts, strict=True):
-            runs = rows[name, size]
+        for size, case in zip(sizes, cases, strict=True):
+            count, runs, ours = len(case.cells), rows[name, size], rows.get(("turgor", size), [])
             title = PEERS[name].title
             if failed := [str(run["failure"]) for run in runs if "failure" in run]:
-                cells = [title, failed[0].replace("|", "/"), f"{count:,}", *[""] * (len(HEAD) - 3)]
+                cells = [title, failed[0].replace("|", "/"), f"{count:,}", *[""] * (len(head) - 3)]
             else:
                 walls.append((count, median(runs, "wall_s")))
                 exponent = f"{growth(walls):.2f}" if size == sizes[-1] and len(walls) > 1 else ""
-                cells = [title, *figures(runs, count), off(runs, rows.get(("turgor", size), [])), exponent]
+                cells = [title, *figures(runs, count), exponent]
+                for key, (_, unit) in compared.items():
+                    cells += [f"{unit * amount(runs[-1], key):.6g}", off(runs, ours, key)]
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -177,24 +186,27 @@ def figures(runs: list[dict[str, object]], count: int) -> list[str]:
         f"{median(runs, 'peak_memory_MB'):.0f}",
         str(last["iterations"]),
         str(last["factorisations"]),
-        f"{np.linalg.norm(last['tip']):.5f}",
     ]
+
+
+def amount(run: dict[str, object], key: str) -> float:
+    """Return the size of what a code says: a number or a displacement."""
+    return float(np.linalg.norm(run[key]))
 
 
 def median(runs: list[dict[str, object]], key: str) -> float:
     return statistics.median(float(run[key]) for run in runs)
 
 
-def off(runs: list[dict[str, object]], ours: list[dict[str, object]]) -> str:
-    """Return by how much more or less the tip moves than Turgor's on the same mesh, in percent of that."""
+def off(runs: list[dict[str, object]], ours: list[dict[str, object]], key: str) -> str:
+    """Return by how much a result is larger or smaller than Turgor's on the same mesh, in percent of that."""
     if not ours or "failure" in ours[-1]:
         return ""
-    tip, reference = (float(np.linalg.norm(run[-1]["tip"])) for run in (runs, ours))
-    return f"{100 * (tip / reference - 1):+.2g} %"
+    return f"{100 * (amount(runs[-1], key) / amount(ours[-1], key) - 1):+.2g} %"
 
 
 def growth(walls: list[tuple[int, float]]) -> float:
-    """Return k of wall time ∝ (number of tetrahedra)ᵏ, by least squares of the logarithms."""
+    """Return k of wall time ∝ (number of cells)ᵏ, by least squares of the logarithms."""
     return float(np.polyfit(*np.log(walls).T, 1)[0])
 
 

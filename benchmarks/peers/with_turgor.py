@@ -1,7 +1,7 @@
 """Turgor: P2–P0, mixed Newton in one load step, on two threads; `direct` or `iterative` (third argument).
 
-`direct` condenses the mean pressures and factorises with PARDISO, its default at these sizes; `iterative` keeps them as
-unknowns of a Krylov method, and does not tell whether the state is stable, as the peers do not.
+`direct` condenses the mean pressures and factorises with PARDISO, its default at these sizes; `iterative`, for bodies
+in space, keeps them as unknowns of a Krylov method, and does not tell whether the state is stable, as the peers do not.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from case_t import BULK, MU, PRESSURE, TOLERANCE, TubeMesh
+from case import TOLERANCE, Case
 from measure import Solved, run
 
 import turgor
 from turgor.fem.loads import Pressure
-from turgor.fem.supports import Clamped
+from turgor.fem.section import Axisymmetric, PlaneStrain
+from turgor.fem.supports import Prescribed
 from turgor.fem.system import System
 from turgor.materials.registry import create
 from turgor.mesh import Mesh
@@ -22,35 +23,28 @@ from turgor.solver.linear import solver_in_use
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, solve_path
 
-
-def tube_mesh(size: float) -> TubeMesh:
-    """Mesh case T with Turgor's mesher at an element size in mm."""
-    mesh = turgor.CappedTube().mesh(size=f"{size} mm")
-    tip = int(mesh.markers["tip"][0])
-    return TubeMesh(mesh.points, mesh.cells, mesh.surfaces["mount"], mesh.surfaces["cavity"], tip)
+SECTIONS = {"space": None, "plane-strain": PlaneStrain(), "axisymmetric": Axisymmetric()}
 
 
-def body_of(tube: TubeMesh) -> Mesh:
-    """Return the tube as a mesh of Turgor's."""
-    return Mesh(
-        points=tube.points,
-        cells=tube.cells,
-        regions={"body": np.arange(len(tube.cells), dtype=np.int32)},
-        surfaces={"mount": tube.mount, "cavity": tube.cavity},
-        markers={},
-        curves={},
-    )
+def system_of(case: Case) -> System:
+    """Return the case as a model of Turgor's."""
+    mesh = Mesh(case.points, case.cells, surfaces=case.surfaces)
+    rubber = create("neo-hookean", {"C10": f"{case.mu / 2} MPa"}, bulk_modulus=f"{case.bulk} MPa")
+    supports = [
+        Prescribed(name, tuple(None if np.isnan(u) else float(u) for u in value)) for name, value in case.held.items()
+    ]
+    loads = [Pressure("cavity", case.pressure)] if case.has_cavity else []
+    return System(mesh, {"body": rubber}, supports, loads, section=SECTIONS[case.kind])
 
 
-def solve(tube: TubeMesh) -> Solved:
-    mesh = body_of(tube)
-    rubber = create("neo-hookean", {"C10": f"{MU / 2} MPa"}, bulk_modulus=f"{BULK} MPa")
-    system = System(mesh, {"body": rubber}, [Clamped("mount")], [Pressure("cavity", PRESSURE)])
+def solve(case: Case) -> Solved:
+    system = system_of(case)
     way = sys.argv[3]
     options = PathOptions(newton=NewtonOptions(tolerance=TOLERANCE, linear=way))
     (end,) = solve_path(system, [1.0], options=options)
     return Solved(
-        tip=tuple(end.state.u[tube.tip].tolist()),
+        tip=tuple(end.state.u[case.tip].tolist()),
+        work=float(np.vdot(system.forces(end.state)[0], np.nan_to_num(case.given))),
         unknowns=system.n_dofs,
         iterations=end.iterations,
         factorisations=end.factorisations,

@@ -1,0 +1,79 @@
+"""The three cases, meshed by Turgor: a capped tube, a block under a punch, a bellows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from case import Case
+
+import turgor
+from turgor.mesh import Mesh
+from turgor.mesh.structured import rectangle
+
+FREE = np.nan
+
+
+@dataclass(frozen=True)
+class Maker:
+    """How a case is made at an element size in mm, and at which sizes unless others are asked for."""
+
+    make: Callable[[float], Case]
+    sizes: tuple[float, ...]
+
+
+def tube(size: float) -> Case:
+    """Case T: a tube of inner radius 6.35 mm, wall 3.5 mm and length 120 mm with solid caps of 17 mm, one end clamped.
+
+    The pressure is 58 % of its limit.
+    """
+    mesh = turgor.CappedTube().mesh(size=f"{size} mm")
+    tip = int(mesh.markers["tip"][0])
+    return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
+
+
+def punch(size: float) -> Case:
+    """Half of a block 2 mm wide and 1 mm high in plane strain: a rough punch, 1 mm wide, is pressed in by 0.1 mm.
+
+    The bottom slides; the upper corner is compared.
+    """
+    n = 2 * round(0.5 / size)
+    mesh = rectangle((1.0, 1.0), (n, n), "tri6")
+    top = mesh.surfaces["y1"]
+    under = top[mesh.points[top[:, 2], 0] < 0.5]
+    body = Mesh(mesh.points, mesh.cells, surfaces={**mesh.surfaces, "punch": under})
+    tip = int(np.argmax(mesh.points.sum(axis=1)))
+    held = {"punch": (0.0, -0.1), "x0": (0.0, FREE), "y0": (FREE, 0.0)}
+    return case_of(body, "plane-strain", 0.1, 1e4, tip, held)
+
+
+def bellows(size: float) -> Case:
+    """The section of the template `bellows`, held at the ring around its inlet."""
+    mesh = turgor.Bellows(model="axisymmetric").mesh(size=f"{size} mm", cells="triangles")
+    tip = int(mesh.markers["tip"][0])
+    held = {"mount": (0.0, 0.0), "axis": (0.0, FREE)}
+    return case_of(mesh, "axisymmetric", 1.0, 1000.0, tip, held, pressure=0.02)
+
+
+def case_of(
+    mesh: Mesh,
+    kind: str,
+    mu: float,
+    ratio: float,
+    tip: int,
+    held: dict[str, tuple[float, ...]],
+    pressure: float = 0.0,
+) -> Case:
+    """Return a mesh of Turgor's as a case; `ratio` is K/μ."""
+    names = [*held, "cavity"] if "cavity" in mesh.surfaces else list(held)
+    surfaces = {name: mesh.surfaces[name] for name in names}
+    given = {name: np.array(value) for name, value in held.items()}
+    return Case(kind, mu, ratio * mu, pressure, mesh.points, mesh.cells, surfaces, given, tip)
+
+
+CASES = {
+    "tube": Maker(tube, (5.0, 3.0, 2.0)),
+    "punch": Maker(punch, (0.125, 0.0625, 0.03125)),
+    "bellows": Maker(bellows, (0.8, 0.4, 0.2)),
+}
