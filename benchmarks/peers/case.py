@@ -52,15 +52,13 @@ class Case:
     @classmethod
     def load(cls, path: Path | str) -> Case:
         with np.load(path) as stored:
-            kept = {name: stored[name] for name in cls.__dataclass_fields__}
-            for group in ("surfaces", "held"):
-                kept[group] = {str(name): stored[f"{group}:{name}"] for name in kept[group]}
-        return cls(
-            **{
-                name: value.item() if not isinstance(value, dict) and not value.ndim else value
-                for name, value in kept.items()
+            arrays = {name: stored[name] for name in cls.__dataclass_fields__}
+            scalars = {name: value.item() for name, value in arrays.items() if not value.ndim}
+            groups = {
+                group: {str(name): stored[f"{group}:{name}"] for name in arrays[group]}
+                for group in ("surfaces", "held")
             }
-        )
+        return cls(**arrays | scalars | groups)
 
     @property
     def dimension(self) -> int:
