@@ -26,12 +26,12 @@ class Case:
     """One body under one load.
 
     ``kind`` is ``space``, ``plane-strain`` (a slice of 1 mm) or ``axisymmetric`` (x the radius, y the axis), with d = 3
-    or 2 coordinates; ``mu``, ``bulk`` and ``pressure``, that in the cavity, are in MPa.
-    ``points (n, d)`` mm; ``cells (m, 10)`` or ``(m, 6)`` in VTK order (corners, then edges 01 12 02 03 13 23, of
-    triangles 01 12 20); ``surfaces`` the named faces ``(k, 6)`` (corners, then edges 01 12 20) or edges ``(k, 3)``
-    (ends, middle) of cells, normals out of the solid; ``held`` for each of those that are held the displacement
-    ``(d,)``, mm, NaN where it is free; a surface ``cavity`` is what the pressure acts on; ``tip`` the node whose
-    displacement is compared.
+    or 2 coordinates; ``mu``, ``bulk`` and ``pressure``, that in the cavity, are in MPa. ``points (n, d)`` mm; ``cells
+    (m, 10)``, ``(m, 6)`` or ``(m, 9)`` in VTK order (corners, then edges 01 12 02 03 13 23, of triangles 01 12 20, of
+    quadrilaterals 01 12 23 30 and the centre); ``surfaces`` the named faces ``(k, 6)`` (corners, then edges 01 12 20)
+    or edges ``(k, 3)`` (ends, middle) of cells, normals out of the solid; ``held`` for each of those that are held the
+    displacement ``(d,)``, mm, NaN where it is free; a surface ``cavity`` is what the pressure acts on; ``tip`` the node
+    whose displacement is compared.
     """
 
     kind: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from case import Case
@@ -33,13 +34,13 @@ def tube(size: float) -> Case:
     return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
 
 
-def punch(size: float) -> Case:
+def punch(size: float, cell_type: str = "tri6") -> Case:
     """Half of a block 2 mm wide and 1 mm high in plane strain: a rough punch, 1 mm wide, is pressed in by 0.1 mm.
 
     The bottom slides; the upper corner is compared.
     """
     n = 2 * round(0.5 / size)
-    mesh = rectangle((1.0, 1.0), (n, n), "tri6")
+    mesh = rectangle((1.0, 1.0), (n, n), cell_type)
     top = mesh.surfaces["y1"]
     under = top[mesh.points[top[:, 2], 0] < 0.5]
     body = Mesh(mesh.points, mesh.cells, surfaces={**mesh.surfaces, "punch": under})
@@ -75,5 +76,6 @@ def case_of(
 CASES = {
     "tube": Maker(tube, (5.0, 3.0, 2.0)),
     "punch": Maker(punch, (0.125, 0.0625, 0.03125)),
+    "punch-quads": Maker(partial(punch, cell_type="quad9"), (0.125, 0.0625, 0.03125)),
     "bellows": Maker(bellows, (0.8, 0.4, 0.2)),
 }

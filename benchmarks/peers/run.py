@@ -1,7 +1,7 @@
 """The same case in Turgor and in its peers: one table.
 
-    .venv/bin/python benchmarks/peers/run.py [--case tube|punch|bellows] [--sizes 5 3 2] [--peers turgor felupe …]
-        [--repeat 5]
+    .venv/bin/python benchmarks/peers/run.py [--case tube|punch|punch-quads|bellows] [--sizes 5 3 2]
+        [--peers turgor felupe …] [--repeat 5]
 
 Run `sh benchmarks/peers/install.sh` once before. Every run is a process of its own in the peer's own environment; the
 first small mesh warms it up before the clocks start. Each run's figures go to ``results/CASE.jsonl`` beside this file,
@@ -33,6 +33,10 @@ ONCE_S = 120
 """A run that takes longer than this is not repeated."""
 
 
+SIMPLICES = ("tube", "punch", "bellows")
+"""The cases of tetrahedra and triangles."""
+
+
 @dataclass(frozen=True)
 class Peer:
     """A code: the environment under .peers that it lives in (none: that of this process), its call, its cases."""
@@ -43,7 +47,7 @@ class Peer:
     ranks: int = 1
     arguments: tuple[str, ...] = ()
     program: str | None = None
-    cases: tuple[str, ...] = tuple(CASES)
+    cases: tuple[str, ...] = SIMPLICES
 
     def missing(self) -> str | None:
         """Return why the peer cannot run, ``None`` if it can."""
@@ -63,13 +67,21 @@ class Peer:
 
 
 PEERS = {
-    "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",)),
+    "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",), cases=tuple(CASES)),
     "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=("tube",)),
     "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",)),
     "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
     "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve"),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),
     "dolfinx-p2p1": Peer("DOLFINx, P2–P1", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P1",)),
+    "dolfinx-q2p1": Peer(
+        "DOLFINx, Q2–P1disc",
+        "with_dolfinx.py",
+        "dolfinx",
+        ranks=2,
+        arguments=("Q2-P1disc",),
+        cases=("punch-quads",),
+    ),
     "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
 }
 

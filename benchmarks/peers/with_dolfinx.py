@@ -1,10 +1,11 @@
-"""DOLFINx: P2–P0 or P2–P1 (third argument), Newton in one load step, MUMPS in symmetric mode on two MPI ranks.
+"""DOLFINx: Newton in one load step, MUMPS in symmetric mode on two MPI ranks.
 
-Its best settings of those tried. P2–P0 is Turgor's element, its pressures left in the system, for DOLFINx does not
-condense them; the Taylor–Hood pair P2–P1 of its demos has a quarter of the pressures, but couples them. MUMPS
-factorises L D Lᵀ (`pc_type cholesky`; LU needs 30 % more memory), orders with METIS and analyses the pattern once, on
-two ranks with one thread each, as both codes are made parallel by MPI. Forms are compiled with `-O3 -march=native` and
-integrated with the points of Turgor, four a tetrahedron, three a triangle; UFL's own estimate takes many more.
+Its best settings of those tried, with the pressures P2–P0, P2–P1 or Q2–P1disc (third argument). P2–P0 is Turgor's
+element, its pressures left in the system, for DOLFINx does not condense them; the Taylor–Hood pair P2–P1 of its demos
+has a quarter of the pressures, but couples them. MUMPS factorises L D Lᵀ (`pc_type cholesky`; LU needs 30 % more
+memory), orders with METIS and analyses the pattern once, on two ranks with one thread each, as both codes are made
+parallel by MPI. Forms are compiled with `-O3 -march=native` and integrated with the points of Turgor (four a
+tetrahedron, three a triangle); UFL's own estimate takes many more.
 """
 
 from __future__ import annotations
@@ -24,12 +25,16 @@ from dolfinx.fem import petsc
 from measure import Solved, run
 from petsc4py import PETSc
 
-CELL_NODES = {3: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4], 2: [0, 1, 2, 4, 5, 3]}
-"""Basix's order of the nodes: edges 23 13 12 03 02 01 of a tetrahedron, 12 02 01 of a triangle."""
+CELL_NODES = {10: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4], 6: [0, 1, 2, 4, 5, 3], 9: [0, 1, 3, 2, 4, 7, 5, 6, 8]}
+"""Basix's order of the nodes: edges 23 13 12 03 02 01 of a tetrahedron, 12 02 01 of a triangle; of a quadrilateral the
+corners row by row."""
 
-CELLS = {3: "tetrahedron", 2: "triangle"}
+CELLS = {10: "tetrahedron", 6: "triangle", 9: "quadrilateral"}
+DEGREES = {10: 2, 6: 2, 9: 5}
+"""Of the integration rule: four, three and nine points."""
+
 COMPILED = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
-PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1)}
+PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1)}
 MUMPS = {
     "ksp_type": "preonly",
     "pc_type": "cholesky",
@@ -46,7 +51,7 @@ def solve(case: Case) -> Solved:
     mesh, cavity = curved_mesh(case)
     name = sys.argv[3]
     family, degree = PRESSURES[name]
-    pressures = basix.ufl.element(family, CELLS[case.dimension], degree)
+    pressures = basix.ufl.element(family, cell_of(case), degree)
     space = fem.functionspace(mesh, basix.ufl.mixed_element([quadratic(case), pressures]))
     solution = fem.Function(space)
     force, tangent = forms(case, solution, mesh, cavity)
@@ -70,7 +75,7 @@ def solve(case: Case) -> Solved:
 
 def curved_mesh(case: Case) -> tuple[dolfinx.mesh.Mesh, np.ndarray]:
     """Return the distributed mesh and this rank's cavity faces as pairs of cell and face."""
-    first, order = comm.rank == 0, CELL_NODES[case.dimension]
+    first, order = comm.rank == 0, CELL_NODES[case.cells.shape[1]]
     cells = case.cells[:, order].astype(np.int64) if first else np.empty((0, len(order)), np.int64)
     points = case.points if first else np.empty((0, case.dimension))
     mesh = dolfinx.mesh.create_mesh(comm, cells, quadratic(case), points)
@@ -106,7 +111,7 @@ def held(
 def forms(case: Case, solution: fem.Function, mesh: dolfinx.mesh.Mesh, cavity: np.ndarray) -> tuple[fem.Form, fem.Form]:
     """Return ∂Π and ∂²Π of Π(u, p) = ∫ μ/2 (Ī₁ − 3) + p (J − 1) − p²/2K dV − P · volume of the cavity."""
     u, p = ufl.split(solution)
-    dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": 2})
+    dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": DEGREES[case.cells.shape[1]]})
     in_plane = ufl.Identity(case.dimension) + ufl.grad(u)
     F = deformation(case, mesh, in_plane, u)
     J = ufl.det(F)
@@ -139,14 +144,18 @@ def depth(case: Case, mesh: dolfinx.mesh.Mesh) -> ufl.core.expr.Expr | int:
     return 2 * ufl.pi * ufl.SpatialCoordinate(mesh)[0] if case.is_axisymmetric else 1
 
 
+def cell_of(case: Case) -> str:
+    return CELLS[case.cells.shape[1]]
+
+
 def quadratic(case: Case) -> basix.ufl._ElementBase:
-    return basix.ufl.element("Lagrange", CELLS[case.dimension], 2, shape=(case.dimension,))
+    return basix.ufl.element("Lagrange", cell_of(case), 2, shape=(case.dimension,))
 
 
 def size_of_volume(case: Case, mesh: dolfinx.mesh.Mesh, pressures: basix.ufl._ElementBase) -> float:
     """Return the norm of ∫ q dV over all test pressures q: what the volume's residual is small against."""
     test = ufl.TestFunction(fem.functionspace(mesh, pressures))
-    dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": 2})
+    dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": DEGREES[case.cells.shape[1]]})
     vector = petsc.assemble_vector(fem.form(depth(case, mesh) * test * dx, jit_options=COMPILED))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return float(vector.norm())

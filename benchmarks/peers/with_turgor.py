@@ -1,7 +1,8 @@
-"""Turgor: P2–P0, mixed Newton in one load step, on two threads; `direct` or `iterative` (third argument).
+"""Turgor: mixed Newton in one load step, on two threads; `direct` or `iterative` (third argument).
 
-`direct` condenses the mean pressures and factorises with PARDISO, its default at these sizes; `iterative`, for bodies
-in space, keeps them as unknowns of a Krylov method, and does not tell whether the state is stable, as the peers do not.
+The element is P2–P0, of quadrilaterals Q2–P1disc. `direct` condenses the pressures and factorises with PARDISO, its
+default at these sizes; `iterative`, for bodies in space, keeps them as unknowns of a Krylov method, and does not tell
+whether the state is stable, as the peers do not.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from turgor.solver.linear import solver_in_use
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, solve_path
 
+ELEMENTS = {10: "P2–P0", 6: "P2–P0", 9: "Q2–P1disc"}
 SECTIONS = {"space": None, "plane-strain": PlaneStrain(), "axisymmetric": Axisymmetric()}
 
 
@@ -40,6 +42,7 @@ def system_of(case: Case) -> System:
 def solve(case: Case) -> Solved:
     system = system_of(case)
     way = sys.argv[3]
+    solver = solver_in_use().name if way == "direct" else "GMRES, multigrid"
     options = PathOptions(newton=NewtonOptions(tolerance=TOLERANCE, linear=way))
     (end,) = solve_path(system, [1.0], options=options)
     return Solved(
@@ -48,7 +51,7 @@ def solve(case: Case) -> Solved:
         unknowns=system.n_dofs,
         iterations=end.iterations,
         factorisations=end.factorisations,
-        settings=f"P2–P0 mixed; 1 step; {solver_in_use().name if way == 'direct' else 'GMRES, multigrid'}",
+        settings=f"{ELEMENTS[case.cells.shape[1]]} mixed; 1 step; {solver}",
         version=turgor.__version__,
     )
 
