@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/kernels.py [--size 2]
 
-Each kernel runs on case T (`benchmarks/peers/case_t.py`) as an iteration calls it. It is held against one limit: GB/s
+Each kernel runs on case T (`benchmarks/peers/cases.py`) as an iteration calls it. It is held against one limit: GB/s
 of the arrays that must be read and written, beside those of a copy of a large array, or GFLOP/s of the operations
 written out in the innermost loops, beside those of a product of large matrices (both measured in the same run, with as
 many threads). The best of several repetitions counts.
@@ -24,18 +24,16 @@ import numpy as np
 
 from turgor.fem import kernels
 from turgor.fem.kernels import CHUNKS, parallel
-from turgor.fem.loads import Pressure
-from turgor.fem.supports import Clamped
 from turgor.fem.system import System
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.library import get
-from turgor.materials.registry import create
 from turgor.solver.blocks import BlockMatrix
 from turgor.solver.iterative import AUGMENTATION
 
 sys.path.insert(0, str(Path(__file__).parent / "peers"))
-from case_t import BULK, MU, PRESSURE, TubeMesh
-from with_turgor import body_of, tube_mesh
+from case import Case
+from cases import tube
+from with_turgor import system_of
 
 REPEATS = 15
 LARGE = 2**25
@@ -68,10 +66,6 @@ def copy(source, target):  # type: ignore[no-untyped-def]
     for chunk in numba.prange(CHUNKS):
         for k in range(chunk * len(source) // CHUNKS, (chunk + 1) * len(source) // CHUNKS):
             target[k] = source[k]
-
-
-def system_of(tube: TubeMesh, material: Hyperelastic) -> System:
-    return System(body_of(tube), {"body": material}, [Clamped("mount")], [Pressure("cavity", PRESSURE)])
 
 
 def of_the_element(system: System) -> list[Kernel]:
@@ -108,10 +102,11 @@ def of_the_element(system: System) -> list[Kernel]:
     ]
 
 
-def of_the_material(name: str, tube: TubeMesh, material: Hyperelastic) -> Kernel:
-    """Return stress and tangent of a material at all quadrature points."""
-    system = system_of(tube, material)
+def of_the_material(name: str, case: Case, material: Hyperelastic | None = None) -> Kernel:
+    """Return stress and tangent of a material, or that of the case, at all quadrature points."""
+    system = system_of(case)
     (solid,) = system.solids
+    solid.material = material or solid.material
     rng = np.random.default_rng(0)
     u = 0.01 * rng.standard_normal(system.mesh.points.shape)
     solid.worst_jacobian(u)
@@ -149,15 +144,14 @@ def of_the_matrix(system: System) -> list[Kernel]:
 
 def measure(size: float, threads: int) -> None:
     """Print the rows of the table for so many threads, which those of this process are."""
-    tube = tube_mesh(size)
-    rubber = create("neo-hookean", {"C10": f"{MU / 2} MPa"}, bulk_modulus=f"{BULK} MPa")
-    system = system_of(tube, rubber)
+    case = tube(size)
+    system = system_of(case)
     source, target = np.ones(LARGE), np.empty(LARGE)
     one, other = np.ones((2, MATRIX, MATRIX))
     materials = [
-        of_the_material("neo-Hookean", tube, rubber),
-        of_the_material("polynomial of second order", tube, get("tpu-0deg-mooney-rivlin-5")),
-        of_the_material("Ogden of two terms", tube, get("dragon-skin-10-slow-ogden-2")),
+        of_the_material("neo-Hookean", case),
+        of_the_material("polynomial of second order", case, get("tpu-0deg-mooney-rivlin-5")),
+        of_the_material("Ogden of two terms", case, get("dragon-skin-10-slow-ogden-2")),
     ]
     copied, multiplied = seconds(lambda: copy(source, target)), seconds(lambda: one @ other)
     bandwidth, peak = 2.0 * source.nbytes / copied, 2.0 * MATRIX**3 / multiplied
@@ -168,7 +162,7 @@ def measure(size: float, threads: int) -> None:
         rate = (kernel.size_bytes or kernel.operations) / took
         part = rate / (bandwidth if kernel.size_bytes else peak)
         rates = f"{1e-9 * rate:.1f} | " if kernel.size_bytes else f" | {1e-9 * rate:.1f}"
-        cost = f"{1e3 * took:.2f} | {1e6 * took / len(tube.cells):.2f}"
+        cost = f"{1e3 * took:.2f} | {1e6 * took / len(case.cells):.2f}"
         print(f"| {kernel.name} | {threads} | {cost} | {rates} | {part:.0%} |", flush=True)
 
 
