@@ -27,11 +27,11 @@ class Case:
 
     ``kind`` is ``space``, ``plane-strain`` (a slice of 1 mm) or ``axisymmetric`` (x the radius, y the axis), with d = 3
     or 2 coordinates; ``mu``, ``bulk`` and ``pressure``, that in the cavity, are in MPa. ``points (n, d)`` mm; ``cells
-    (m, 10)``, ``(m, 6)`` or ``(m, 9)`` in VTK order (corners, then edges 01 12 02 03 13 23, of triangles 01 12 20, of
-    quadrilaterals 01 12 23 30 and the centre); ``surfaces`` the named faces ``(k, 6)`` (corners, then edges 01 12 20)
-    or edges ``(k, 3)`` (ends, middle) of cells, normals out of the solid; ``held`` for each of those that are held the
-    displacement ``(d,)``, mm, NaN where it is free; a surface ``cavity`` is what the pressure acts on; ``tip`` the node
-    whose displacement is compared.
+    (m, 10)``, ``(m, 27)``, ``(m, 6)`` or ``(m, 9)`` in VTK order (corners, then edges 01 12 02 03 13 23, of triangles
+    01 12 20, of quadrilaterals 01 12 23 30 and the centre, of hexahedra as in `HEX27`); ``surfaces`` the named faces
+    ``(k, 6)`` (corners, then edges 01 12 20), of hexahedra ``(k, 9)``, or edges ``(k, 3)`` (ends, middle) of cells,
+    normals out of the solid; ``held`` for each of those that are held the displacement ``(d,)``, mm, NaN where it is
+    free; a surface ``cavity`` is what the pressure acts on; ``tip`` the node whose displacement is compared.
     """
 
     kind: str
@@ -65,6 +65,10 @@ class Case:
         return self.points.shape[1]
 
     @property
+    def is_hexahedral(self) -> bool:
+        return self.cells.shape[1] == len(HEX27)
+
+    @property
     def is_axisymmetric(self) -> bool:
         return self.kind == "axisymmetric"
 
@@ -87,11 +91,15 @@ class Case:
         return float(np.nanmax(np.abs(self.given)))
 
     def hosts(self, numbering: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return for each face of the cavity its cell and its place in a peer's `numbering` ``(d + 1, d)`` of faces."""
+        """Return for each face of the cavity its cell and its place in a peer's `numbering` of a cell's faces.
+
+        The `numbering` has a row for each face: the places of its corners in the cell.
+        """
         d = self.dimension
         weights = len(self.points) ** np.arange(d, dtype=np.int64)
-        key = np.sort(self.cells[:, numbering], axis=2).reshape(-1, d) @ weights
-        target = np.sort(self.surfaces["cavity"][:, :d], axis=1) @ weights
+        # Three corners tell a four-cornered face.
+        key = np.sort(self.cells[:, numbering], axis=2)[:, :, :d].reshape(-1, d) @ weights
+        target = np.sort(self.surfaces["cavity"][:, : numbering.shape[1]], axis=1)[:, :d] @ weights
         order = np.argsort(key)
         at = order[np.searchsorted(key, target, sorter=order)]
         assert np.array_equal(key[at], target)
@@ -100,3 +108,9 @@ class Case:
 
 OPPOSITE = {3: np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]), 2: np.array([[1, 2], [0, 2], [0, 1]])}
 """The faces of a simplex by its dimension, each opposite to its corner: how most number them."""
+
+CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+CUBE_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+CUBE_FACES = [(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)]
+HEX27 = np.vstack([CUBE, *(CUBE[list(part)].mean(axis=0) for part in (*CUBE_EDGES, *CUBE_FACES, range(8)))])
+"""The nodes of a hexahedron in the unit cube, in VTK order: corners, middles of the edges, of the faces, its own."""

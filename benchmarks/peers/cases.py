@@ -1,4 +1,4 @@
-"""The three cases, meshed by Turgor: a capped tube, a block under a punch, a bellows."""
+"""The cases, meshed by Turgor: a capped tube, whole, a quarter and a section, a block under a punch, a bellows."""
 
 from __future__ import annotations
 
@@ -32,6 +32,29 @@ def tube(size: float) -> Case:
     mesh = turgor.CappedTube().mesh(size=f"{size} mm")
     tip = int(mesh.markers["tip"][0])
     return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
+
+
+def quarter_tube(size: float) -> Case:
+    """The quarter x, y ≥ 0 of case T, whose cut faces slide."""
+    return quarter(turgor.CappedTube(model="quarter").mesh(size=f"{size} mm"))
+
+
+def hexahedral_tube(size: float) -> Case:
+    """The same quarter in rows of hexahedra, two at least along a quarter of a circle and one through the wall."""
+    return quarter(turgor.CappedTube(model="quarter").mesh(size=f"{size} mm", cells="hexahedra", per_circle=8))
+
+
+def quarter(mesh: Mesh) -> Case:
+    """Return a quarter of case T as a case."""
+    held = {"mount": (0.0, 0.0, 0.0), "symmetry-x": (0.0, FREE, FREE), "symmetry-y": (FREE, 0.0, FREE)}
+    return case_of(mesh, "space", 0.1047, 1000.0, int(mesh.markers["tip"][0]), held, pressure=0.02)
+
+
+def tube_section(size: float, cells: str = "triangles") -> Case:
+    """The section of case T through its axis."""
+    mesh = turgor.CappedTube(model="axisymmetric").mesh(size=f"{size} mm", cells=cells)
+    held = {"mount": (0.0, 0.0), "axis": (0.0, FREE)}
+    return case_of(mesh, "axisymmetric", 0.1047, 1000.0, int(mesh.markers["tip"][0]), held, pressure=0.02)
 
 
 def punch(size: float, cell_type: str = "tri6") -> Case:
@@ -75,6 +98,9 @@ def case_of(
 
 CASES = {
     "tube": Maker(tube, (5.0, 3.0, 2.0)),
+    "tube-quarter": Maker(quarter_tube, (5.0, 3.0, 2.0)),
+    "tube-hexahedra": Maker(hexahedral_tube, (40.0, 10.0, 5.0)),
+    "tube-section": Maker(tube_section, (1.6, 0.8, 0.4)),
     "punch": Maker(punch, (0.125, 0.0625, 0.03125)),
     "punch-quads": Maker(partial(punch, cell_type="quad9"), (0.125, 0.0625, 0.03125)),
     "bellows": Maker(bellows, (0.8, 0.4, 0.2)),

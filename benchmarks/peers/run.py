@@ -1,6 +1,6 @@
 """The same case in Turgor and in its peers: one table.
 
-    .venv/bin/python benchmarks/peers/run.py [--case tube|punch|punch-quads|bellows] [--sizes 5 3 2]
+    .venv/bin/python benchmarks/peers/run.py [--case tube|tube-hexahedra|punch|…] [--sizes 5 3 2]
         [--peers turgor felupe …] [--repeat 5]
 
 Run `sh benchmarks/peers/install.sh` once before. Every run is a process of its own in the peer's own environment; the
@@ -33,8 +33,10 @@ ONCE_S = 120
 """A run that takes longer than this is not repeated."""
 
 
-SIMPLICES = ("tube", "punch", "bellows")
+SIMPLICES = ("tube", "tube-quarter", "tube-section", "punch", "bellows")
 """The cases of tetrahedra and triangles."""
+
+IN_SPACE = ("tube", "tube-quarter", "tube-hexahedra")
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,10 @@ class Peer:
 
 PEERS = {
     "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",), cases=tuple(CASES)),
-    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=("tube",)),
-    "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",)),
+    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=IN_SPACE),
+    "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",), cases=(*SIMPLICES, "tube-hexahedra")),
     "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
-    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve"),
+    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", cases=(*SIMPLICES, "tube-hexahedra")),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),
     "dolfinx-p2p1": Peer("DOLFINx, P2–P1", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P1",)),
     "dolfinx-q2p1": Peer(
@@ -80,7 +82,15 @@ PEERS = {
         "dolfinx",
         ranks=2,
         arguments=("Q2-P1disc",),
-        cases=("punch-quads",),
+        cases=("punch-quads", "tube-hexahedra"),
+    ),
+    "dolfinx-q2p1-space": Peer(
+        "DOLFINx, Q2–P1space",
+        "with_dolfinx.py",
+        "dolfinx",
+        ranks=2,
+        arguments=("Q2-P1space",),
+        cases=("tube-hexahedra",),
     ),
     "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
 }

@@ -1,6 +1,6 @@
 """DOLFINx: Newton in one load step, MUMPS in symmetric mode on two MPI ranks.
 
-Its best settings of those tried, with the pressures P2–P0, P2–P1 or Q2–P1disc (third argument). P2–P0 is Turgor's
+Its best settings of those tried, with P2–P0, P2–P1, Q2–P1disc or Q2–P1space (third argument). P2–P0 is Turgor's
 element, its pressures left in the system, for DOLFINx does not condense them; the Taylor–Hood pair P2–P1 of its demos
 has a quarter of the pressures, but couples them. MUMPS factorises L D Lᵀ (`pc_type cholesky`; LU needs 30 % more
 memory), orders with METIS and analyses the pattern once, on two ranks with one thread each, as both codes are made
@@ -19,7 +19,7 @@ import dolfinx
 import measure
 import numpy as np
 import ufl
-from case import OPPOSITE, Case
+from case import HEX27, OPPOSITE, Case
 from dolfinx import fem
 from dolfinx.fem import petsc
 from measure import Solved, run
@@ -29,12 +29,18 @@ CELL_NODES = {10: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4], 6: [0, 1, 2, 4, 5, 3], 9: [0, 
 """Basix's order of the nodes: edges 23 13 12 03 02 01 of a tetrahedron, 12 02 01 of a triangle; of a quadrilateral the
 corners row by row."""
 
-CELLS = {10: "tetrahedron", 6: "triangle", 9: "quadrilateral"}
-DEGREES = {10: 2, 6: 2, 9: 5}
-"""Of the integration rule: four, three and nine points."""
+LAGRANGE = basix.ElementFamily.P, basix.CellType.hexahedron, 2, basix.LagrangeVariant.equispaced
+CELL_NODES[27] = [int(np.argmin(np.abs(HEX27 - place).sum(axis=1))) for place in basix.create_element(*LAGRANGE).points]
+HEX27_FACES = np.array(CELL_NODES[27])[np.array(basix.topology(basix.CellType.hexahedron)[2])]
+
+CELLS = {10: "tetrahedron", 6: "triangle", 9: "quadrilateral", 27: "hexahedron"}
+DEGREES = {10: 2, 6: 2, 9: 5, 27: 5}
+"""Of the integration rule: four, three, nine and 27 points."""
 
 COMPILED = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
-PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1)}
+PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1), "Q2-P1space": ("DG", 0, (4,))}
+"""The last two are linear in the coordinates of the reference cell, and in those of space, as in Turgor."""
+
 MUMPS = {
     "ksp_type": "preonly",
     "pc_type": "cholesky",
@@ -50,8 +56,8 @@ comm = MPI.COMM_WORLD
 def solve(case: Case) -> Solved:
     mesh, cavity = curved_mesh(case)
     name = sys.argv[3]
-    family, degree = PRESSURES[name]
-    pressures = basix.ufl.element(family, cell_of(case), degree)
+    family, degree, *shape = PRESSURES[name]
+    pressures = basix.ufl.element(family, cell_of(case), degree, shape=shape[0] if shape else None)
     space = fem.functionspace(mesh, basix.ufl.mixed_element([quadratic(case), pressures]))
     solution = fem.Function(space)
     force, tangent = forms(case, solution, mesh, cavity)
@@ -81,7 +87,7 @@ def curved_mesh(case: Case) -> tuple[dolfinx.mesh.Mesh, np.ndarray]:
     mesh = dolfinx.mesh.create_mesh(comm, cells, quadratic(case), points)
     if not case.has_cavity:
         return mesh, np.empty((0, 2), np.int32)
-    host, face = case.hosts(OPPOSITE[case.dimension])
+    host, face = case.hosts(HEX27_FACES if case.is_hexahedral else OPPOSITE[case.dimension])
     owned = np.asarray(mesh.topology.original_cell_index)[: mesh.topology.index_map(case.dimension).size_local]
     here = np.full(len(case.cells), -1, dtype=np.int32)
     here[owned] = np.arange(len(owned))
@@ -111,6 +117,7 @@ def held(
 def forms(case: Case, solution: fem.Function, mesh: dolfinx.mesh.Mesh, cavity: np.ndarray) -> tuple[fem.Form, fem.Form]:
     """Return ∂Π and ∂²Π of Π(u, p) = ∫ μ/2 (Ī₁ − 3) + p (J − 1) − p²/2K dV − P · volume of the cavity."""
     u, p = ufl.split(solution)
+    p = field_of(p, mesh)
     dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": DEGREES[case.cells.shape[1]]})
     in_plane = ufl.Identity(case.dimension) + ufl.grad(u)
     F = deformation(case, mesh, in_plane, u)
@@ -119,7 +126,7 @@ def forms(case: Case, solution: fem.Function, mesh: dolfinx.mesh.Mesh, cavity: n
     potential = depth(case, mesh) * energy * dx
     if case.has_cavity:
         # Exact: what is integrated is of this degree along the faces.
-        degree = 5 if case.is_axisymmetric else 4
+        degree = 5 if case.is_axisymmetric or case.is_hexahedral else 4
         ds = ufl.Measure("ds", mesh, subdomain_data=[(1, cavity.ravel())], metadata={"quadrature_degree": degree})
         x, area = ufl.SpatialCoordinate(mesh) + u, ufl.cofac(in_plane) * ufl.FacetNormal(mesh)
         flux = ufl.pi * x[0] ** 2 * area[0] if case.is_axisymmetric else ufl.dot(x, area) / 3
@@ -152,11 +159,21 @@ def quadratic(case: Case) -> basix.ufl._ElementBase:
     return basix.ufl.element("Lagrange", cell_of(case), 2, shape=(case.dimension,))
 
 
+def field_of(p: ufl.core.expr.Expr, mesh: dolfinx.mesh.Mesh) -> ufl.core.expr.Expr:
+    """Return the pressure of its unknowns: four constants of a cell stand for 1, x, y and z about its middle."""
+    if not p.ufl_shape:
+        return p
+    middle = fem.Function(fem.functionspace(mesh, ("DG", 0, (3,))))
+    middle.interpolate(lambda x: x)
+    local = ufl.SpatialCoordinate(mesh) - middle
+    return p[0] + sum(p[i + 1] * local[i] for i in range(3))
+
+
 def size_of_volume(case: Case, mesh: dolfinx.mesh.Mesh, pressures: basix.ufl._ElementBase) -> float:
     """Return the norm of ∫ q dV over all test pressures q: what the volume's residual is small against."""
     test = ufl.TestFunction(fem.functionspace(mesh, pressures))
     dx = ufl.Measure("dx", mesh, metadata={"quadrature_degree": DEGREES[case.cells.shape[1]]})
-    vector = petsc.assemble_vector(fem.form(depth(case, mesh) * test * dx, jit_options=COMPILED))
+    vector = petsc.assemble_vector(fem.form(depth(case, mesh) * field_of(test, mesh) * dx, jit_options=COMPILED))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return float(vector.norm())
 

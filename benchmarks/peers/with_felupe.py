@@ -4,7 +4,8 @@ Its best settings of those tried (third argument `mixed`). The nearly incompress
 each cell and condenses it, the same discretisation as Turgor's; its three-field form would solve a larger, indefinite
 matrix. The linear solver is pypardiso instead of SciPy's SuperLU, as FElupe's documentation advises, in symmetric mode,
 which halves the work of its default. Assembly has `parallel=True` and two threads. FElupe has no boundary region for
-quadratic simplices; `CavityFaces` is one, built as FElupe's own regions are. `displacement` takes its plain
+quadratic simplices; `CavityFaces` is one, built as FElupe's own regions are. In hexahedra the body is Q2–P0, one mean
+pressure to a cell being all it has. `displacement` takes its plain
 `SolidBody`, to show what locking does to a punch; it finds no way in ten steps, so it takes 20.
 """
 
@@ -69,6 +70,7 @@ def solve(case: Case) -> Solved:
             )
         iterations += newton.iterations
     pardiso.free_memory(everything=True)
+    order = "Q2" if case.is_hexahedral else "P2"
     counted = "1 step" if steps == 1 else f"{steps} steps"
     return Solved(
         tip=tuple((turn @ field[0].values[case.tip]).tolist()),
@@ -76,7 +78,7 @@ def solve(case: Case) -> Solved:
         unknowns=len(free),
         iterations=iterations,
         factorisations=iterations,
-        settings=f"{'P2–P0 mixed, condensed' if mixed else 'P2 displacement'}; {counted}; MKL PARDISO",
+        settings=f"{order}{'–P0 mixed, condensed' if mixed else ' displacement'}; {counted}; MKL PARDISO",
         version=fem.__version__,
     )
 
@@ -86,15 +88,22 @@ def bodies(
 ) -> tuple[fem.FieldContainer, fem.SolidBody | fem.SolidBodyNearlyIncompressible, list[fem.SolidBodyPressure]]:
     """Return the displacement, the solid and what presses on it; `points` are in FElupe's axes."""
     d = case.dimension
-    mesh = fem.Mesh(points, case.cells, CELL_TYPES[d])
-    field = fem.FieldContainer([FIELDS[case.kind](fem.Region(mesh, ELEMENTS[d], RULES[d]), dim=d)])
+    if case.is_hexahedral:
+        region = fem.RegionTriQuadraticHexahedron(fem.Mesh(points, case.cells, "hexahedron27"))
+    else:
+        region = fem.Region(fem.Mesh(points, case.cells, CELL_TYPES[d]), ELEMENTS[d], RULES[d])
+    field = fem.FieldContainer([FIELDS[case.kind](region, dim=d)])
     if mixed:
         solid = fem.SolidBodyNearlyIncompressible(fem.NeoHooke(mu=case.mu, parallel=True), field, bulk=case.bulk)
     else:
         solid = fem.SolidBody(fem.NeoHooke(mu=case.mu, bulk=case.bulk, parallel=True), field)
     if not case.has_cavity:
         return field, solid, []
-    faces = fem.FieldContainer([FIELDS[case.kind](CavityFaces(case, points), dim=d)])
+    if case.is_hexahedral:
+        cavity = fem.RegionTriQuadraticHexahedronBoundary(region.mesh, mask=np.unique(case.surfaces["cavity"]))
+    else:
+        cavity = CavityFaces(case, points)
+    faces = fem.FieldContainer([FIELDS[case.kind](cavity, dim=d)])
     return field, solid, [fem.SolidBodyPressure(faces, pressure=case.pressure)]
 
 

@@ -1,8 +1,8 @@
 """Turgor: mixed Newton in one load step, on two threads; `direct` or `iterative` (third argument).
 
-The element is P2–P0, of quadrilaterals Q2–P1disc. `direct` condenses the pressures and factorises with PARDISO, its
-default at these sizes; `iterative`, for bodies in space, keeps them as unknowns of a Krylov method, and does not tell
-whether the state is stable, as the peers do not.
+The element is P2–P0, of quadrilaterals and hexahedra Q2–P1disc. `direct` condenses the pressures and factorises with
+PARDISO, its default at these sizes; `iterative`, for bodies in space, keeps them as unknowns of a Krylov
+method, and does not tell whether the state is stable, as the peers do not.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from turgor.solver.linear import solver_in_use
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, solve_path
 
-ELEMENTS = {10: "P2–P0", 6: "P2–P0", 9: "Q2–P1disc"}
+ELEMENTS = {10: "P2–P0", 6: "P2–P0", 9: "Q2–P1disc", 27: "Q2–P1disc"}
 SECTIONS = {"space": None, "plane-strain": PlaneStrain(), "axisymmetric": Axisymmetric()}
 
 
