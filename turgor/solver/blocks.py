@@ -93,22 +93,9 @@ class BlockMatrix:
         self.values: Singles = np.zeros(9 * blocks, np.float32)
         row, column, name = np.repeat(np.arange(n), np.diff(ordered.indptr)), ordered.indices, ordered.data
         place, width = np.empty(blocks, np.int64), np.full(blocks, 3)
-        begin = 0
-        triangles = []
-        for backward in (False, True):
-            entries = np.flatnonzero(column > row if backward else column < row)
-            if backward:
-                entries = entries[np.argsort(-row[entries], kind="stable")]
-            counts = np.bincount(row[entries], minlength=n)
-            start = np.concatenate([[0], np.cumsum(counts[::-1] if backward else counts)])
-            first = np.repeat(start[:-1], np.diff(start))
-            place[entries] = begin + 9 * first + 3 * (np.arange(len(entries)) - first)
-            width[entries] = 3 * counts[row[entries]]
-            part = self.values[begin : begin + 9 * len(entries)]
-            triangles.append(Triangle(start, np.ascontiguousarray(column[entries], np.int32), part, backward))
-            begin += 9 * len(entries)
-        self.earlier, self.later = triangles
-        on = np.flatnonzero(row == column)
+        self.earlier = self._triangle(row, column, 0, place, width, backward=False)
+        self.later = self._triangle(row, column, len(self.earlier.values), place, width, backward=True)
+        on, begin = np.flatnonzero(row == column), len(self.earlier.values) + len(self.later.values)
         place[on] = begin + 9 * np.arange(n)
         self.diagonal: Singles = self.values[begin:].reshape(n, 3, 3)
         # The diagonal blocks are their own transposes.
@@ -117,6 +104,22 @@ class BlockMatrix:
         )
         self._inverse = np.empty((n, 3, 3))
         self._replaced = np.zeros(0, np.intp)
+
+    def _triangle(
+        self, row: Longs, column: Ints, begin: int, place: Longs, width: Longs, *, backward: bool
+    ) -> Triangle:
+        """Return one side of the diagonal, whose values begin at `begin`; fill the places and widths of its blocks."""
+        n = len(self.order)
+        entries = np.flatnonzero(column > row if backward else column < row)
+        if backward:
+            entries = entries[np.argsort(-row[entries], kind="stable")]
+        counts = np.bincount(row[entries], minlength=n)
+        start = np.concatenate([[0], np.cumsum(counts[::-1] if backward else counts)])
+        first = np.repeat(start[:-1], np.diff(start))
+        place[entries] = begin + 9 * first + 3 * (np.arange(len(entries)) - first)
+        width[entries] = 3 * counts[row[entries]]
+        values = self.values[begin : begin + 9 * len(entries)]
+        return Triangle(start, np.ascontiguousarray(column[entries], np.int32), values, backward)
 
     def update(self) -> None:
         """Make ready to sweep with the values."""
