@@ -48,7 +48,7 @@ LONGEST_REACH = 2.0
 STIFFER = 6
 """How often contact is made stiffer before one equilibrium is given up."""
 
-LOOKS = 4
+LOOKS = 2
 """How often for what is only seen by the independent look, between the points at which contact acts."""
 
 LAGS = 25
