@@ -9,30 +9,42 @@ import pytest
 import yaml
 
 import turgor as tg
+from turgor.common.units import to_internal
 from turgor.mesh.decks import write_deck
 from turgor.mesh.structured import shell_octant
 from turgor.study.meshing import checked_mesh
 
 
-@pytest.fixture
-def ball(tmp_path: Path) -> Path:
-    """An octant of a hollow ball in a .inp file in centimetres, and its case."""
-    write_deck(shell_octant(0.4, 0.6, 1), tmp_path / "ball.inp")
+def case_of(folder: Path, radii: tuple[float, float], unit: str, **more: object) -> Path:
+    """Write an octant of a hollow ball of inner and outer radius to a .inp file, and its case."""
+    write_deck(shell_octant(*radii, 1), folder / "ball.inp")
+    inner, outer = (radius * to_internal(unit, "length") for radius in radii)
     case = {
         "geometry": {
             "template": "mesh",
             "file": "ball.inp",
-            "unit": "1 cm",
-            "surfaces": {"cavity": {"ball": {"centre": ["0 mm"] * 3, "radius": "4.01 mm"}}},
-            "tip": ["0 mm", "0 mm", "6 mm"],
+            "unit": unit,
+            "surfaces": {"cavity": {"ball": {"centre": ["0 mm"] * 3, "radius": f"{inner + 0.01} mm"}}},
+            "tip": ["0 mm", "0 mm", f"{outer} mm"],
         },
-        "materials": {"body": {"model": "neo-hookean", "constants": {"C10": "0.05 MPa"}}},
         "supports": [{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
-        "loads": [{"type": "pressure", "value": "5 kPa"}],
         "solver": {"steps": 1},
+        **more,
     }
-    (tmp_path / "ball.yaml").write_text(yaml.safe_dump(case))
-    return tmp_path / "ball.yaml"
+    (folder / "ball.yaml").write_text(yaml.safe_dump(case))
+    return folder / "ball.yaml"
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    """A ball in centimetres."""
+    return case_of(
+        tmp_path,
+        (0.4, 0.6),
+        "1 cm",
+        materials={"body": {"model": "neo-hookean", "constants": {"C10": "0.05 MPa"}}},
+        loads=[{"type": "pressure", "value": "5 kPa"}],
+    )
 
 
 def test_the_ball_swells(ball: Path, tmp_path: Path) -> None:
@@ -63,23 +75,15 @@ def test_a_wrong_key_is_named(change: str, words: str, ball: Path) -> None:
 def test_a_case_goes_on_behind_the_snap_of_a_balloon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
     # A Mooney–Rivlin sphere of radii 5 and 6 mm has its limit at 29.12 kPa and jumps (tests/analytic/test_balloons.py).
-    write_deck(shell_octant(5.0, 6.0, 1), tmp_path / "balloon.inp")
-    case = {
-        "geometry": {
-            "template": "mesh",
-            "file": "balloon.inp",
-            "unit": "1 mm",
-            "surfaces": {"cavity": {"ball": {"centre": ["0 mm"] * 3, "radius": "5.01 mm"}}},
-            "tip": ["0 mm", "0 mm", "6 mm"],
-        },
-        "materials": {"body": {"model": "mooney-rivlin", "constants": {"C10": "0.05 MPa", "C01": "0.007 MPa"}}},
-        "supports": [{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
-        "loads": [{"type": "pressure", "value": "30 kPa"}],
-        "solver": {"steps": 1},
-        "control": {"type": "pressure", "at_limit": "post-snap"},
-    }
-    (tmp_path / "balloon.yaml").write_text(yaml.safe_dump(case))
-    done = tg.run(tg.load_case(tmp_path / "balloon.yaml"), tmp_path / "run")
+    case = case_of(
+        tmp_path,
+        (5.0, 6.0),
+        "1 mm",
+        materials={"body": {"model": "mooney-rivlin", "constants": {"C10": "0.05 MPa", "C01": "0.007 MPa"}}},
+        loads=[{"type": "pressure", "value": "30 kPa"}],
+        control={"type": "pressure", "at_limit": "post-snap"},
+    )
+    done = tg.run(tg.load_case(case), tmp_path / "run")
     with (done.folder / "history.csv").open(encoding="utf-8") as stream:
         limit, snapped, end = csv.DictReader(stream)
     assert [row["event"] for row in (limit, snapped, end)] == ["limit-pressure", "post-snap", ""]
