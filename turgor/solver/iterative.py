@@ -113,11 +113,11 @@ class Iterative(StiffnessSolver):
         load = np.zeros(n)
         load[self._levels.free.ravel()] = right[self._number]
         # At the out-of-balance force, what the lagging pressures leave of it is much less than all.
-        lagging = volumes.start
-        if np.linalg.norm(load - volumes.forces(lagging)) > np.linalg.norm(load):
-            lagging = np.zeros_like(lagging)
+        lagging, left = volumes.start, load - volumes.forces(volumes.start)
+        if np.linalg.norm(left) > np.linalg.norm(load):
+            lagging, left = np.zeros_like(lagging), load
         x = np.concatenate([np.zeros(n), lagging])
-        residual = np.concatenate([load - volumes.forces(lagging), -volumes.residual(x[:n], lagging)])
+        residual = np.concatenate([left, -volumes.residual(x[:n], lagging)])
         goal = accuracy * float(np.linalg.norm(residual))
         count = 0
         while True:

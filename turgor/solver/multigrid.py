@@ -172,14 +172,16 @@ def _project(  # type: ignore[no-untyped-def]
                         own[3 * i + k] = diagonal[a, i, k] if free[a, i] and free[a, k] else 0.0
                 parents = (up_start, up_column, up, row, place, width, out)
                 _add_to_parents(share, own, 0, 3, a, *parents)
-                first, last = earlier_start[a], earlier_start[a + 1]
-                for m in range(first, last):
-                    at = 9 * first + 3 * (m - first)
-                    _add_to_parents(share, earlier, at, 3 * (last - first), earlier_column[m], *parents)
-                first, last = later_start[n_fine - 1 - a], later_start[n_fine - a]
-                for m in range(first, last):
-                    at = 9 * first + 3 * (m - first)
-                    _add_to_parents(share, later, at, 3 * (last - first), later_column[m], *parents)
+                _add_row(share, earlier_start, earlier_column, earlier, a, *parents)
+                _add_row(share, later_start, later_column, later, n_fine - 1 - a, *parents)
+
+
+@jit
+def _add_row(share, start, column, values, c, *parents):  # type: ignore[no-untyped-def]
+    """Add all blocks of row c of one side of the diagonal."""
+    first, last = start[c], start[c + 1]
+    for m in range(first, last):
+        _add_to_parents(share, values, 9 * first + 3 * (m - first), 3 * (last - first), column[m], *parents)
 
 
 @jit

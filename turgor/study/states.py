@@ -130,15 +130,15 @@ def standing(
         ``interfaces``: by its regions, the traction;
         ``supports``: by its surface, force and torque on the body.
     """
-    moments = {term.fibre.curve: float(term.moment(state.u).max()) for term in system.bending}
+    bent = {term.fibre.curve: {"largest_moment_N_mm": float(term.moment(state.u).max())} for term in system.bending}
     found = {
         "contact": {contact.name: _touch(contact, state) for contact in system.contacts},
         "fibres": {
             embedded.fibre.curve: {
                 "largest_tension_N": float(embedded.tension(state.u).max()),
                 "largest_strain": float(embedded.strain(state.u).max()),
-                **({"largest_moment_N_mm": moments[curve]} if (curve := embedded.fibre.curve) in moments else {}),
             }
+            | bent.get(embedded.fibre.curve, {})
             for embedded in system.fibres
         },
         "interfaces": {interface.name: interface.facts(state) for interface in between},
