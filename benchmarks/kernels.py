@@ -126,7 +126,6 @@ def of_the_matrix(system: System) -> list[Kernel]:
     right = np.random.default_rng(0).standard_normal(3 * len(matrix.order))
     lists, pairs = sum(a.nbytes for a in pattern._sources), sum(a.nbytes for a in pattern._pairs)
     places = sum(a.nbytes for a in vars(matrix.layout).values())
-    half = matrix.values.nbytes / 2
     return [
         Kernel(
             "assembly, single entries",
@@ -138,8 +137,7 @@ def of_the_matrix(system: System) -> list[Kernel]:
             lambda: pattern.sum_into_layout(packed, matrix.layout, matrix.values),
             size_bytes=packed.nbytes + pairs + places + matrix.values.nbytes,
         ),
-        Kernel("forward sweep and what it leaves", lambda: matrix.sweep_forward(right), size_bytes=2 * half),
-        Kernel("backward sweep and its product", lambda: matrix.sweep_backward(right, right), size_bytes=3 * half),
+        Kernel("sweep and its product", lambda: matrix.sweep(right, right), size_bytes=2.0 * matrix.values.nbytes),
     ]
 
 

@@ -62,17 +62,16 @@ def dense(system, values):
 def split(system, state, order=None):
     """Return the volume equations, and A in double precision, its nodes as they are or in an order."""
     matrix = BlockMatrix(system.pattern)
-    layout, values = matrix.layout, np.zeros(9 * matrix.structure.nnz)
+    layout, values = matrix.layout, np.zeros(len(matrix.values))
     equations = system.split_stiffness(state, AUGMENTATION, layout, values)
     graph = sp.triu(system.pattern.graph(), format="coo")
     n = len(matrix.order)
     whole = np.zeros((n, 3, n, 3))
     for a, b, name in zip(graph.row, graph.col, graph.data, strict=True):
-        to, width = layout.above[name - 1], layout.above_width[name - 1]
-        back, back_width = layout.below[name - 1], layout.below_width[name - 1]
-        for i in range(3):
-            whole[a, i, b] = values[to + i * width : to + i * width + 3]
-            whole[b, i, a] = values[back + i * back_width : back + i * back_width + 3]
+        to, width = layout.place[name - 1], layout.width[name - 1]
+        block = np.array([values[to + i * width : to + i * width + 3] for i in range(3)])
+        whole[a, :, b] = block.T if layout.turned[name - 1] else block
+        whole[b, :, a] = whole[a, :, b].T
     if order is not None:
         whole = whole[order][:, :, order]
     return equations, whole.reshape(3 * n, 3 * n)
@@ -81,7 +80,8 @@ def split(system, state, order=None):
 @pytest.mark.parametrize("ratio", [1e3, 1e5])
 @pytest.mark.parametrize("build", [lambda r: tube(3.0, r), lambda r: sphere("hex27", 2, r)], ids=["tet10", "hex27"])
 def test_it_finds_the_same_equilibrium_as_the_factorisation(build, ratio, monkeypatch):
-    monkeypatch.setattr(LinearSolver, "serves_again", False)  # Newton's method with exact steps
+    # Newton's method with exact steps
+    monkeypatch.setattr(LinearSolver, "solution_again", lambda *_: None)
     system = build(ratio)
     solver = Iterative(system)
     rest, options = system.reference_state(), NewtonOptions()
@@ -130,7 +130,7 @@ def test_the_split_stiffness_is_the_stiffness(cell_type):
 
 
 @pytest.mark.parametrize("indefinite", [False, True])
-def test_block_products_and_sweeps_are_those_of_the_matrix(indefinite):
+def test_the_sweep_is_that_of_the_matrix(indefinite):
     system = sphere("tet10", 2)
     state = system.reference_state()
     matrix = BlockMatrix(system.pattern)
@@ -146,23 +146,18 @@ def test_block_products_and_sweeps_are_those_of_the_matrix(indefinite):
     if indefinite:
         diagonal[some] = np.eye(3) * np.abs(diagonal[some])
     x = np.random.default_rng(0).standard_normal(3 * n)
-    near = {"rtol": 0.0, "atol": 1e-5 * np.abs(whole @ x).max()}
-    np.testing.assert_allclose(matrix.product(x), whole @ x, **near)
     node = np.arange(3 * n) // 3
-    lower, upper = whole * (node[:, None] > node), whole * (node[:, None] < node)
+    lower = whole * (node[:, None] > node)
     for a in range(n):
-        lower[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = upper[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = diagonal[a]
+        lower[3 * a : 3 * a + 3, 3 * a : 3 * a + 3] = diagonal[a]
     right = np.random.default_rng(1).standard_normal(3 * n)
-    found, left = matrix.sweep_forward(right)
-    np.testing.assert_allclose(found, np.linalg.solve(lower, right), atol=1e-5 * np.abs(found).max())
-    np.testing.assert_allclose(left, right - whole @ found, atol=1e-5 * np.abs(whole @ found).max())
-    found, product = matrix.sweep_backward(right, x)
-    np.testing.assert_allclose(found, x + np.linalg.solve(upper, right - whole @ x), atol=1e-5 * np.abs(found).max())
+    found, product = matrix.sweep(right, x)
+    np.testing.assert_allclose(found, x + np.linalg.solve(lower, right - whole @ x), atol=1e-5 * np.abs(found).max())
     np.testing.assert_allclose(product, whole @ found, atol=1e-5 * np.abs(whole @ found).max())
 
 
 @pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
-def test_the_cycle_is_symmetric_positive_definite_and_near_the_inverse(cell_type):
+def test_a_cycle_lessens_every_error(cell_type):
     system = System(box((1.0, 1.0, 6.0), (1, 1, 6), cell_type), {"body": neo_hookean()}, PLANES)
     levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
     assert len(levels.fine._bounds) > 2  # or else no portion has a neighbour
@@ -175,20 +170,21 @@ def test_the_cycle_is_symmetric_positive_definite_and_near_the_inverse(cell_type
         unit = np.zeros(len(free))
         unit[k] = 1.0
         columns.append(levels.apply(unit)[0][free])
-    cycle = np.array(columns)
-    np.testing.assert_allclose(cycle, cycle.T, atol=1e-5 * np.abs(cycle).max())
+    cycle = np.array(columns).T
     _, whole = split(system, state, levels.fine.order)
     root = np.linalg.cholesky(whole[np.ix_(free, free)])
-    spectrum = np.linalg.eigvalsh(root.T @ (0.5 * (cycle + cycle.T)) @ root)
-    assert spectrum[0] > 0.1
-    assert spectrum[-1] < 1.0 + 1e-3  # of a symmetric cycle with exact coarse solution
+    # What is left of an error, measured by its energy.
+    left = np.eye(len(root)) - root.T @ cycle @ root
+    assert np.linalg.norm(left, 2) < 0.95
+    assert np.abs(np.linalg.eigvals(left)).max() < 0.9
 
 
 @pytest.mark.parametrize("cell_type", ["tet10", "hex27"])
 def test_interpolation_from_the_corners_reproduces_linear_fields(cell_type):
     mesh = box((1.0, 2.0, 3.0), (2, 1, 2), cell_type)
-    up = corner_interpolation(mesh.cells)
+    nodes, up = corner_interpolation(mesh.cells)
     corners = np.unique(mesh.cells[:, : body_cell(mesh.cells).n_corners])
+    np.testing.assert_array_equal(nodes, corners)
     assert up.shape == (mesh.n_points, len(corners))
     np.testing.assert_allclose(up @ mesh.points[corners], mesh.points, atol=1e-12)
 
@@ -205,7 +201,7 @@ def test_the_coarse_level_may_be_solved_by_algebraic_multigrid(monkeypatch):
     found = find_equilibrium(system, solver, rest, 1.0, options)
     assert np.abs(found.state.u - expected.state.u).max() <= 1e-6 * np.abs(expected.state.u).max()
     assert max(solver.iterations) <= 40
-    assert sum(solver.iterations) > sum(factorised.iterations)
+    assert solver.iterations[0] > factorised.iterations[0]
 
 
 def test_rigid_body_modes_do_no_work():
@@ -222,6 +218,7 @@ def test_rigid_body_modes_do_no_work():
 def test_what_it_cannot_solve_is_factorised(monkeypatch, caplog):
     system = sphere("tet10")
     monkeypatch.setattr(iterative, "MOST_ITERATIONS", 2)
+    monkeypatch.setattr(iterative, "FAILURES", 2)
     solver = Iterative(system)
     rest, options = system.reference_state(), NewtonOptions()
     found = find_equilibrium(system, solver, rest, 1.0, options)
@@ -318,8 +315,7 @@ def test_the_sweeps_do_not_depend_on_the_threads():
     try:
         for number in (1, threads):
             numba.set_num_threads(number)
-            x, _ = matrix.sweep_forward(right)
-            found.append(matrix.sweep_backward(right, x)[0])
+            found.append(np.concatenate(matrix.sweep(right, right)))
     finally:
         numba.set_num_threads(threads)
     assert np.linalg.norm(found[0]) > 0.0

@@ -86,22 +86,18 @@ def compile_constraints(
     fixed = np.zeros(mesh.points.shape, bool)
     values = np.zeros(mesh.points.shape)
     nodes, frames = [], []
-    known: dict[tuple[tuple[bytes, float], ...], tuple[Floats, Floats]] = {}
+    known: dict[tuple[tuple[bytes, float], ...], tuple[NDArray[np.intp], Floats, Floats | None]] = {}
     for node, conditions in rows.items():
         # Most nodes of a surface are held alike.
         key = tuple((direction.tobytes(), wanted) for direction, wanted, _ in conditions)
         if key not in known:
-            known[key] = _independent(conditions, mesh.points[node])
-        basis, given = known[key]
-        axes = np.argmax(np.abs(basis), axis=1)
-        if np.allclose(np.abs(basis[np.arange(len(basis)), axes]), 1.0, atol=1e-12):
-            fixed[node, axes] = True
-            values[node, axes] = given * np.sign(basis[np.arange(len(basis)), axes])
-        else:
-            fixed[node, : len(basis)] = True
-            values[node, : len(basis)] = given
+            known[key] = _held(*_independent(conditions, mesh.points[node]))
+        axes, given, frame = known[key]
+        fixed[node, axes] = True
+        values[node, axes] = given
+        if frame is not None:
             nodes.append(node)
-            frames.append(_completed(basis))
+            frames.append(frame)
     return Constraints(
         fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, mesh.dimension, mesh.dimension)
     )
@@ -205,6 +201,15 @@ def _independent(conditions: list[Condition], place: Floats) -> tuple[Floats, Fl
                 expected="supports that agree where their surfaces meet",
             )
     return np.array(basis), np.array(given)
+
+
+def _held(basis: Floats, given: Floats) -> tuple[NDArray[np.intp], Floats, Floats | None]:
+    """Return which components are given, their values, and the frame in which they are, ``None`` for the axes."""
+    axes = np.argmax(np.abs(basis), axis=1)
+    along = basis[np.arange(len(basis)), axes]
+    if np.allclose(np.abs(along), 1.0, atol=1e-12):
+        return axes, given * np.sign(along), None
+    return np.arange(len(basis)), given, _completed(basis)
 
 
 def _completed(basis: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem.section import Axisymmetric, Section, depth
-from turgor.mesh.cells import CELLS, Cell, determinants, face_cell, jacobians
+from turgor.mesh.cells import CELLS, Cell, face_cell, inverses, jacobians
 
 Floats = NDArray[np.float64]
 
@@ -41,12 +41,12 @@ def reference_gradients(nodes: Floats, cell: Cell, section: Section | None) -> t
         ``(m, q)``, mm³.
     """
     places = cell.shape_at_quadrature @ nodes
-    jacobian = jacobians(nodes, cell)
-    G = np.zeros((*jacobian.shape[:2], 3, cell.n_nodes))
-    G[:, :, : cell.dimension] = np.linalg.inv(jacobian).swapaxes(-1, -2) @ cell.gradient_at_quadrature.swapaxes(-1, -2)
+    inverse, determinant = inverses(jacobians(nodes, cell))
+    G = np.zeros((*determinant.shape, 3, cell.n_nodes))
+    G[:, :, : cell.dimension] = inverse.swapaxes(-1, -2) @ cell.gradient_at_quadrature.swapaxes(-1, -2)
     if isinstance(section, Axisymmetric):
         G[:, :, 2] = cell.shape_at_quadrature / places[:, :, :1]
-    return G, determinants(jacobian) * cell.weights * depth(section, places)
+    return G, determinant * cell.weights * depth(section, places)
 
 
 def pressure_modes(nodes: Floats, cell: Cell, dV: Floats) -> Floats:

@@ -34,16 +34,17 @@ class BlockLayout:
 
     Attributes
     ----------
-    above, below
-        Places of the blocks of nodes on and above the diagonal, and of their transposes, ``(n_pairs,)``.
-    above_width, below_width
-        By how much each of its rows stands behind the one before.
+    place
+        Of the pairs of nodes on and above the diagonal, where their blocks begin, ``(n_pairs,)``.
+    width
+        By how much each of a block's rows stands behind the one before.
+    turned
+        Whether it stands there transposed.
     """
 
-    above: Longs
-    above_width: Longs
-    below: Longs
-    below_width: Longs
+    place: Longs
+    width: Longs
+    turned: NDArray[np.bool_]
 
 
 class SparsePattern:
@@ -124,9 +125,9 @@ class SparsePattern:
         return sp.csr_matrix(upper - sp.triu(upper, 1).T)
 
     def sum_into_layout(self, packed: Floats, layout: BlockLayout, out: NDArray[np.floating]) -> None:
-        """Add up the `packed` block entries of a system in space into whole blocks, fixed components being identity."""
+        """Add up the `packed` block entries of a system in space into blocks, fixed components being identity."""
         node_start, node_column, *_ = self._places
-        places = (layout.above, layout.above_width, layout.below, layout.below_width)
+        places = (layout.place, layout.width, layout.turned)
         _sum_into_layout(packed, *self._pairs, *places, node_start, node_column, self.free.reshape(-1, 3), out)
 
     @functools.cached_property
@@ -325,7 +326,7 @@ def _gather(packed, start, source, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, parallel=True)
 def _sum_into_layout(  # type: ignore[no-untyped-def]
-    packed, start, source, code, above, above_width, below, below_width, node_start, node_column, free, out
+    packed, start, source, code, place, widths, turned, node_start, node_column, free, out
 ):
     n_chunks = 64
     n = len(free)
@@ -339,12 +340,10 @@ def _sum_into_layout(  # type: ignore[no-untyped-def]
                     for k in range(3):
                         if not (free[a, i] and free[b, k]):
                             block[i, k] = 1.0 * (a == b and i == k)
-                to, width = above[m], above_width[m]
-                back, back_width = below[m], below_width[m]
+                to, width = place[m], widths[m]
                 for i in range(3):
                     for k in range(3):
-                        out[to + i * width + k] = block[i, k]
-                        out[back + k * back_width + i] = block[i, k]
+                        out[to + i * width + k] = block[k, i] if turned[m] else block[i, k]
 
 
 @nb.njit(cache=True, inline="always")

@@ -209,8 +209,12 @@ class Solid(Mixed):
             gradient,
             (1.0 - share)[:, None, None] * bulk,
             (1.0 + augmentation) * modulus,
-            dilatation - self._now.dilatation,
         )
+
+    def lag(self, state: State, lagged: Floats) -> Floats:
+        """Return by how much the lagged dilatations exceed those of the displacement, ``(m, k)``."""
+        self._deform(state.u)
+        return np.asarray(self._lagged_dilatation(lagged) - self._now.dilatation)
 
     def dilatation(self, state: State, lagged: Floats) -> Floats:
         """Return each element's mean lagged dilatation, at an equilibrium its ratio of volumes, ``(m,)``."""

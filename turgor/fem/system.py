@@ -224,6 +224,10 @@ class System:
         self.pattern.sum_into_layout(self._packed, layout, out)
         return equations
 
+    def dilatation_lag(self, state: State) -> tuple[Floats, ...]:
+        """Return for each solid by how much its lagged dilatations exceed those of the displacement, ``(m, k)``."""
+        return tuple(solid.lag(state, lagged) for solid, lagged in zip(self.solids, state.lagged, strict=False))
+
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
         local = self.constraints.to_frames(du)

@@ -29,8 +29,6 @@ class VolumeEquations:
         E, ``(m, k, k)``, MPa/mm³.
     modulus
         What resists a change of volume in A, ``(m,)``, MPa.
-    lag
-        By how much the lagged dilatations exceed those of the displacement, ``(m, k)``.
     """
 
     nodes: Ints
@@ -38,4 +36,3 @@ class VolumeEquations:
     gradient: Floats
     bulk: Floats
     modulus: Floats
-    lag: Floats

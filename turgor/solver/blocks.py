@@ -1,20 +1,17 @@
-"""A symmetric matrix of 3 × 3 blocks, one for each pair of coupled nodes, and the sweeps of a smoother over it.
+"""A symmetric matrix of 3 × 3 blocks, one for each pair of coupled nodes, and the sweep of a smoother over it.
 
-The blocks left of the diagonal lie in rows, those right of it in rows in reverse order, each as a sweep goes through
-them: going backward through memory takes three times as long. The three scalar rows of a node lie one behind the
-other, each over all its blocks: the entries of a vector are gathered once for the three, and the sums run over memory
-that lies side by side.
+Only the blocks on the diagonal and left of it are stored. The three scalar rows of a node lie one behind the other,
+each over all its blocks: a row is read once, and serves with the entries of a vector that it gathers for its own sum
+and, transposed, with what it adds to the sums of earlier rows.
 
 Nodes are numbered by reverse Cuthill and McKee (1969), so that neighbours are near, and cut into portions that touch
-the next and the last one only. Every other portion comes first, then the rest: Gauss–Seidel goes through all portions
-of one half at once, its result does not depend on the number of threads, and the backward sweep is the transpose of
-the forward one. Within a portion nodes of one colour, which are not coupled, follow each other, so that a row need not
-wait for the one before it.
+the next and the last one only. Every other portion comes first, then the rest in two turns, so that no two portions of
+a turn touch a common one: Gauss–Seidel goes through all portions of a turn at once, and its result does not depend on
+the number of threads. Within a portion nodes of one colour, which are not coupled, follow each other, so that a row
+need not wait for the one before it.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
@@ -22,7 +19,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import CHUNKS, inverse, jit, parallel
+from turgor.fem.kernels import inverse, jit, parallel
 from turgor.fem.pattern import BlockLayout, SparsePattern
 
 Floats = NDArray[np.float64]
@@ -32,28 +29,6 @@ Longs = NDArray[np.int64]
 
 PORTIONS = 16
 """Most portions that the nodes are cut into."""
-
-
-@dataclass(frozen=True, eq=False)
-class Triangle:
-    """The blocks on one side of the diagonal: row c is that of node c, or `backward` that of the c-th from the end.
-
-    Attributes
-    ----------
-    start, column
-        Where each row begins, ``(n_nodes + 1,)``, and the nodes of its blocks, ascending.
-    values
-        Of the scalar rows, ``(9 n_blocks,)``: a view of those of :class:`BlockMatrix`.
-    """
-
-    start: Longs
-    column: Ints
-    values: Singles
-    backward: bool
-
-    def add_product(self, x: Floats, out: Floats) -> None:
-        """Add the product with ``x (3 n_nodes,)`` to `out`."""
-        _add_product(self.start, self.column, self.values, self.backward, x, out)
 
 
 class BlockMatrix:
@@ -68,58 +43,45 @@ class BlockMatrix:
     ----------
     order, rank
         The node at each place, and the place of each node, ``(n_nodes,)``.
+    start, column
+        Where the blocks left of the diagonal begin in each row, ``(n_nodes + 1,)``, and their columns, ascending.
     values
-        Of all blocks, in single precision, placed as `layout` says.
+        Of these blocks and then of those on the diagonal, in single precision, placed as `layout` says.
     layout
         Where the blocks of the pattern stand among them.
-    earlier, later
-        The blocks left and right of the diagonal.
     diagonal
-        Those on it, ``(n_nodes, 3, 3)``.
+        The blocks on the diagonal, ``(n_nodes, 3, 3)``.
     structure
-        A one for each block, ``(n_nodes, n_nodes)``.
+        A one for each block on either side, ``(n_nodes, n_nodes)``.
     """
 
     def __init__(self, pattern: SparsePattern) -> None:
         graph = pattern.graph()
         self.order, self._bounds = _portions(graph)
         self.rank: Ints = np.argsort(self.order).astype(np.int32)
-        half = len(self._bounds) // 2
-        self._halves = ((0, half), (half, len(self._bounds) - 1))
+        count = len(self._bounds) - 1
+        half = (count + 1) // 2
+        self._turns = (np.arange(half), np.arange(half, count, 2), np.arange(half + 1, count, 2))
         ordered = graph[self.order][:, self.order]
         ordered.sort_indices()
-        n, blocks = len(self.order), ordered.nnz
-        self.structure = sp.csr_matrix((np.ones(blocks), ordered.indices, ordered.indptr), shape=ordered.shape)
-        self.values: Singles = np.zeros(9 * blocks, np.float32)
-        row, column, name = np.repeat(np.arange(n), np.diff(ordered.indptr)), ordered.indices, ordered.data
-        place, width = np.empty(blocks, np.int64), np.full(blocks, 3)
-        self.earlier = self._triangle(row, column, 0, place, width, backward=False)
-        self.later = self._triangle(row, column, len(self.earlier.values), place, width, backward=True)
-        on, begin = np.flatnonzero(row == column), len(self.earlier.values) + len(self.later.values)
-        place[on] = begin + 9 * np.arange(n)
+        n, counts = len(self.order), np.diff(ordered.indptr)
+        self.structure = sp.csr_matrix((np.ones(ordered.nnz, np.int8), ordered.indices, ordered.indptr), ordered.shape)
+        row = np.repeat(np.arange(n, dtype=np.int32), counts)
+        left, on = ordered.indices < row, ordered.indices == row
+        widths = np.bincount(row[left], minlength=n)
+        self.start: Longs = np.concatenate([[0], np.cumsum(widths)])
+        self.column: Ints = np.ascontiguousarray(ordered.indices[left], np.int32)
+        self._widest = 3 * int(widths.max())
+        begin = 9 * len(self.column)
+        self.values: Singles = np.zeros(begin + 9 * n, np.float32)
         self.diagonal: Singles = self.values[begin:].reshape(n, 3, 3)
-        # The diagonal blocks are their own transposes.
-        self.layout = BlockLayout(
-            *_named(place, width, name), *_named(place, width, np.where(row == column, name, -name))
-        )
+        first = self.start[row[left]]
+        place = np.concatenate([9 * first + 3 * (np.arange(len(first)) - first), begin + 9 * np.arange(n)])
+        width = np.concatenate([3 * widths[row[left]], np.full(n, 3)])
+        name = np.concatenate([ordered.data[left], ordered.data[on]])
+        self.layout = _layout(name, place, width)
         self._inverse = np.empty((n, 3, 3))
         self._replaced = np.zeros(0, np.intp)
-
-    def _triangle(
-        self, row: Longs, column: Ints, begin: int, place: Longs, width: Longs, *, backward: bool
-    ) -> Triangle:
-        """Return one side of the diagonal, whose values begin at `begin`; fill the places and widths of its blocks."""
-        n = len(self.order)
-        entries = np.flatnonzero(column > row if backward else column < row)
-        if backward:
-            entries = entries[np.argsort(-row[entries], kind="stable")]
-        counts = np.bincount(row[entries], minlength=n)
-        start = np.concatenate([[0], np.cumsum(counts[::-1] if backward else counts)])
-        first = np.repeat(start[:-1], np.diff(start))
-        place[entries] = begin + 9 * first + 3 * (np.arange(len(entries)) - first)
-        width[entries] = 3 * counts[row[entries]]
-        values = self.values[begin : begin + 9 * len(entries)]
-        return Triangle(start, np.ascontiguousarray(column[entries], np.int32), values, backward)
 
     def update(self) -> None:
         """Make ready to sweep with the values."""
@@ -134,48 +96,37 @@ class BlockMatrix:
         self._inverse[self._replaced] = np.eye(3) / sizes[:, None, :]
         self._added = np.eye(3) * sizes[:, None, :] - blocks
 
-    def product(self, x: Floats) -> Floats:
-        """Return the product with a vector ``(3 n_nodes,)``."""
-        out = (self.diagonal @ x.reshape(-1, 3, 1)).ravel()
-        self.earlier.add_product(x, out)
-        self.later.add_product(x, out)
-        return out
-
-    def sweep_forward(self, right: Floats) -> tuple[Floats, Floats]:
-        """Return what Gauss–Seidel makes of zero going forward, and what it leaves of the right-hand side."""
-        x = np.empty_like(right)
-        self._sweep(self.earlier, self._halves, right, x)
-        # It balances all but what comes later in each row.
-        later = -self._excess(x)
-        self.later.add_product(x, later)
-        return x, -later
-
-    def sweep_backward(self, right: Floats, x: Floats) -> tuple[Floats, Floats]:
-        """Return what Gauss–Seidel makes of `x` going backward, and the product with it."""
-        before = np.zeros_like(x)
-        self.earlier.add_product(x, before)
-        target = right - before + self._excess(x)
-        found = np.empty_like(x)
-        self._sweep(self.later, self._halves[::-1], target, found)
-        # It balances all but what has changed earlier in each row.
-        product = target - self._excess(found)
-        self.earlier.add_product(found, product)
-        return found, product
-
-    def _sweep(self, side: Triangle, halves: tuple[tuple[int, int], ...], right: Floats, x: Floats) -> None:
-        for first, last in halves:
+    def sweep(self, right: Floats, x: Floats) -> tuple[Floats, Floats]:
+        """Return what a sweep of Gauss–Seidel makes of `x` ``(3 n_nodes,)``, and the product with it."""
+        later = np.zeros_like(x)
+        for portions in self._turns:
+            _add_later(self.start, self.column, self.values, self._widest, self._bounds, portions, x, later)
+        found, product = np.empty_like(x), right.copy()
+        target = right - later
+        if len(self._replaced):
+            target += self._excess(x)
+        for portions in self._turns:
             _sweep(
-                *(side.start, side.column, side.values, side.backward, self._bounds),
-                *(self._inverse, right, first, last, x),
+                *(self.start, self.column, self.values, self._widest, self._bounds, portions),
+                *(self._inverse, target, x, found, product),
             )
+        if len(self._replaced):
+            product -= self._excess(found - x)
+        return found, product
 
     def _excess(self, x: Floats) -> Floats:
         """Return the product with what the diagonal blocks of the sweeps have more than those of the matrix."""
         excess = np.zeros((len(self.order), 3))
-        if len(self._replaced):
-            at = x.reshape(-1, 3)[self._replaced]
-            excess[self._replaced] = (self._added @ at[:, :, None])[:, :, 0]
+        at = x.reshape(-1, 3)[self._replaced]
+        excess[self._replaced] = (self._added @ at[:, :, None])[:, :, 0]
         return excess.ravel()
+
+
+def _layout(name: Longs, place: Longs, width: Longs) -> BlockLayout:
+    """Return how the blocks of pairs stand at places, named as by :meth:`SparsePattern.graph`."""
+    order = np.empty(len(name), np.int64)
+    order[np.abs(name) - 1] = np.arange(len(name))
+    return BlockLayout(place[order], width[order], (name < 0)[order])
 
 
 def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
@@ -192,14 +143,6 @@ def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
     colour = _coloured(graph.indptr, graph.indices, near)
     bounds = np.concatenate([[0], np.cumsum(np.concatenate([sizes[::2], sizes[1::2]]))])
     return near[np.lexsort((colour[near], portion, portion % 2))], bounds
-
-
-def _named(place: Longs, width: Longs, name: Longs) -> tuple[Longs, Longs]:
-    """Return places and widths of those blocks whose names, counted from one, are positive, in their order."""
-    known = name > 0
-    order = np.empty(int(known.sum()), np.int64)
-    order[name[known] - 1] = np.flatnonzero(known)
-    return place[order], width[order]
 
 
 @nb.njit(cache=True)
@@ -219,41 +162,47 @@ def _coloured(start, column, order):  # type: ignore[no-untyped-def]
 
 
 @parallel
-def _add_product(start, column, values, backward, x, out):  # type: ignore[no-untyped-def]
-    n = len(start) - 1
-    for chunk in nb.prange(CHUNKS):
-        near = np.empty(_widest(start), x.dtype)
-        for c in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            a = n - 1 - c if backward else c
-            _gather_blocks(column[start[c] : start[c + 1]], x, near)
-            for i in range(3):
-                out[3 * a + i] += _row_product(start, values, c, i, near)
+def _add_later(start, column, values, widest, bounds, portions, x, out):  # type: ignore[no-untyped-def]
+    """Add to earlier rows of `out` what the rows of some portions, of which no two touch a common one, share in `x`."""
+    for k in nb.prange(len(portions)):
+        near = np.empty(widest, x.dtype)
+        for a in range(bounds[portions[k]], bounds[portions[k] + 1]):
+            _add_transposed(start, column, values, a, x[3 * a], x[3 * a + 1], x[3 * a + 2], near, out)
 
 
 @parallel
-def _sweep(start, column, values, backward, bounds, inverses, right, first, last, x):  # type: ignore[no-untyped-def]
-    """Go through the rows of some portions, of which none touches another."""
-    n = len(start) - 1
-    for portion in nb.prange(first, last):
-        near = np.empty(_widest(start), x.dtype)
+def _sweep(start, column, values, widest, bounds, portions, inverses, target, x, found, product):  # type: ignore[no-untyped-def]
+    """Go through the rows of such portions; add what the change from `x` makes of the rows before to `product`."""
+    for k in nb.prange(len(portions)):
+        near = np.empty(widest, x.dtype)
         rest = np.empty(3, x.dtype)
-        begin = n - bounds[portion + 1] if backward else bounds[portion]
-        for c in range(begin, begin + bounds[portion + 1] - bounds[portion]):
-            a = n - 1 - c if backward else c
-            _gather_blocks(column[start[c] : start[c + 1]], x, near)
+        for a in range(bounds[portions[k]], bounds[portions[k] + 1]):
+            _gather_blocks(column[start[a] : start[a + 1]], found, near)
             for i in range(3):
-                rest[i] = right[3 * a + i] - _row_product(start, values, c, i, near)
+                rest[i] = target[3 * a + i] - _row_product(start, values, a, i, near)
             for i in range(3):
-                x[3 * a + i] = inverses[a, i, 0] * rest[0] + inverses[a, i, 1] * rest[1] + inverses[a, i, 2] * rest[2]
+                found[3 * a + i] = (
+                    inverses[a, i, 0] * rest[0] + inverses[a, i, 1] * rest[1] + inverses[a, i, 2] * rest[2]
+                )
+            for i in range(3):
+                rest[i] = found[3 * a + i] - x[3 * a + i]
+            _add_transposed(start, column, values, a, rest[0], rest[1], rest[2], near, product)
 
 
 @jit
-def _widest(start):  # type: ignore[no-untyped-def]
-    """Return the number of entries in the longest row."""
-    most = 0
-    for a in range(len(start) - 1):
-        most = max(most, start[a + 1] - start[a])
-    return 3 * most
+def _add_transposed(start, column, values, a, x0, x1, x2, near, out):  # type: ignore[no-untyped-def]
+    """Add the product of row `a`, transposed, with the entries of its node to those of the nodes of its blocks."""
+    first, last = start[a], start[a + 1]
+    width = 3 * (last - first)
+    row0 = values[9 * first : 9 * first + width]
+    row1 = values[9 * first + width : 9 * first + 2 * width]
+    row2 = values[9 * first + 2 * width : 9 * first + 3 * width]
+    for m in range(width):
+        near[m] = row0[m] * x0 + row1[m] * x1 + row2[m] * x2
+    for j in range(last - first):
+        b = 3 * column[first + j]
+        for i in range(3):
+            out[b + i] += near[3 * j + i]
 
 
 @jit
@@ -265,10 +214,10 @@ def _gather_blocks(column, x, near):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _row_product(start, values, c, i, near):  # type: ignore[no-untyped-def]
-    """Return the product of scalar row `i` of row `c` with `near`."""
-    width = 3 * (start[c + 1] - start[c])
-    begin = 9 * start[c] + i * width
+def _row_product(start, values, a, i, near):  # type: ignore[no-untyped-def]
+    """Return the product of scalar row `i` of row `a` with `near`."""
+    width = 3 * (start[a + 1] - start[a])
+    begin = 9 * start[a] + i * width
     row = values[begin : begin + width]
     total = 0.0
     for m in range(len(row)):

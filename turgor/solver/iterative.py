@@ -15,6 +15,8 @@ order of μ.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -45,6 +47,9 @@ With less, the pressures are harder to find; with more, A is harder to smooth.
 MOST_ITERATIONS = 180
 """Of one linear problem; then it is factorised."""
 
+LEFT = 1.0
+"""What is out of balance up to so many times what the last step may have left is hardly more than that."""
+
 FAILURES = 3
 """Tangents on which the method has failed, after which all are factorised."""
 
@@ -59,7 +64,7 @@ class Iterative(StiffnessSolver):
     """
 
     name: ClassVar[str] = "GMRES with multigrid"
-    serves_again: ClassVar[bool] = False
+    cheap_again: ClassVar[bool] = False
 
     def __init__(self, system: System) -> None:
         self.iterations: list[int] = []
@@ -71,6 +76,7 @@ class Iterative(StiffnessSolver):
         self._direct: LinearSolver | None = None
         self._factorised = False
         self._failures = 0
+        self._left = 0.0
 
     def take_stiffness(self, system: System, state: State) -> None:
         """Set up the mixed problem and its preconditioner."""
@@ -86,38 +92,55 @@ class Iterative(StiffnessSolver):
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the step for a right-hand side ``(n,)``, with what it leaves of the volume equations."""
-        if self._factorised or (found := self._solution(right, accuracy)) is None:
-            u = system.nodal(self._factors().solve(right))
-            return Solution(u, tuple(np.zeros((len(s.nodes), s.modes.shape[2])) for s in system.solids))
-        u, q = found
-        return Solution(system.nodal(self._free_part(u)), self._volumes.unmet(u, q))
+        problem = None if self._factorised else self._problem(right, self._state)
+        return self._solution(system, right, problem, accuracy)
+
+    def solution_again(self, system: System, right: Floats, state: State) -> Solution | None:
+        """Return the step from a later state, unless more is out of balance there than the last step left."""
+        problem = None if self._factorised else self._problem(right, state)
+        if problem is not None and not np.linalg.norm(problem.residual) <= LEFT * self._left:
+            return None
+        return self._solution(system, right, problem, FORCING)
 
     def solve(self, right: Floats) -> Floats:
         """Return the displacements ``(n,)``."""
-        if self._factorised or (found := self._solution(right, ACCURATE)) is None:
-            return self._factors().solve(right)
-        return self._free_part(found[0])
+        problem = None if self._factorised else self._problem(right, self._state)
+        found = None if problem is None else self._found(problem, ACCURATE)
+        return self._factors().solve(right) if found is None else self._free_part(found[0])
 
     @property
     def negative_pivots(self) -> int | None:
         """Unknown, unless the stiffness had to be factorised."""
         return self._factors().negative_pivots if self._factorised else None
 
-    def _solution(self, right: Floats, accuracy: float) -> tuple[Floats, Floats] | None:
+    def _solution(self, system: System, right: Floats, problem: _Problem | None, accuracy: float) -> Solution:
+        found = None if problem is None else self._found(problem, accuracy)
+        if found is None:
+            u = system.nodal(self._factors().solve(right))
+            return Solution(u, tuple(np.zeros((len(s.nodes), s.modes.shape[2])) for s in system.solids))
+        u, q = found
+        return Solution(system.nodal(self._free_part(u)), self._volumes.unmet(u, q))
+
+    def _problem(self, right: Floats, state: State) -> _Problem:
+        """Return the mixed problem for a right-hand side, begun at the pressures that lag at a state."""
+        volumes, n = self._volumes, 3 * len(self._levels.free)
+        load = np.zeros(n)
+        load[self._levels.free.ravel()] = right[self._number]
+        # At the out-of-balance force, what the lagging pressures leave of it is much less than all.
+        lagging = volumes.of_lag(self._system.dilatation_lag(state))
+        left = load - volumes.forces(lagging)
+        if np.linalg.norm(left) > np.linalg.norm(load):
+            lagging, left = np.zeros_like(lagging), load
+        x = np.concatenate([np.zeros(n), lagging])
+        return _Problem(load, x, np.concatenate([left, -volumes.residual(x[:n], lagging)]))
+
+    def _found(self, problem: _Problem, accuracy: float) -> tuple[Floats, Floats] | None:
         """Return displacements and pressures in the order of the levels, ``None`` if they are not found.
 
         The method works with a matrix in single precision; a solution that is to be more accurate than that is
         corrected by what it leaves of the residual in double precision.
         """
-        volumes, n = self._volumes, 3 * len(self._levels.free)
-        load = np.zeros(n)
-        load[self._levels.free.ravel()] = right[self._number]
-        # At the out-of-balance force, what the lagging pressures leave of it is much less than all.
-        lagging, left = volumes.start, load - volumes.forces(volumes.start)
-        if np.linalg.norm(left) > np.linalg.norm(load):
-            lagging, left = np.zeros_like(lagging), load
-        x = np.concatenate([np.zeros(n), lagging])
-        residual = np.concatenate([left, -volumes.residual(x[:n], lagging)])
+        n, x, residual = len(problem.load), problem.start, problem.residual
         goal = accuracy * float(np.linalg.norm(residual))
         count = 0
         while True:
@@ -128,7 +151,7 @@ class Iterative(StiffnessSolver):
             x = x + change
             if not converged or accuracy >= FORCING:
                 break
-            residual = self._residual(load, x)
+            residual = self._residual(problem.load, x)
             if float(np.linalg.norm(residual)) <= goal:
                 break
             converged = float(np.linalg.norm(residual)) < 0.5 * size
@@ -137,6 +160,7 @@ class Iterative(StiffnessSolver):
         self.iterations.append(count)
         log.debug("%d iterations of %s", count, self.name)
         if converged:
+            self._left = goal
             return x[:n], x[n:]
         self._failures += 1
         log.warning("%s has not converged within %d iterations: factorising", self.name, count)
@@ -175,30 +199,45 @@ class Iterative(StiffnessSolver):
         return self._direct
 
 
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """The loads ``(3 n_nodes,)`` of a mixed problem, where its iteration starts, and what is out of balance there."""
+
+    load: Floats
+    start: Floats
+    residual: Floats
+
+
 class _Volumes:
     """The volume equations of all solids, scaled so that S is the identity, and their rows to forces."""
 
     def __init__(self, levels: TwoLevels, equations: list[VolumeEquations]) -> None:
         self._equations = equations
-        self._factor, self._compliance, gradients, start, weight = [], [], [], [], []
+        self._factor, self._compliance, gradients, weight = [], [], [], []
         for eq in equations:
-            m, k = eq.lag.shape
-            compliance = np.linalg.inv(eq.bulk)
+            m, k = eq.gradient.shape[:2]
+            compliance = _inverses(eq.bulk)
             schur = compliance + (eq.volume / eq.modulus)[:, None, None] * np.eye(k)
-            factor = np.linalg.cholesky(schur)
-            inverse = np.linalg.inv(factor)
+            factor = np.asarray(np.linalg.cholesky(schur), float)
+            inverse = _inverses(factor)
             self._factor.append(factor)
             self._compliance.append(inverse @ compliance @ inverse.swapaxes(1, 2))
             free = levels.free[levels.fine.rank[eq.nodes]].transpose(0, 2, 1).reshape(m, 1, -1)
             gradients.append(inverse @ (eq.gradient.reshape(m, k, -1) * free))
-            rate = eq.bulk @ (eq.volume[:, None] * eq.lag)[:, :, None]
-            start.append((factor.swapaxes(1, 2) @ rate).ravel())
             weight.append(np.repeat(np.sqrt(eq.modulus * np.cbrt(eq.volume)), k))
         self._B = _gradient_matrix(levels, equations, gradients)
         self._Bt = self._B.T.tocsr()
         self._weight = np.concatenate(weight)
-        self.start = np.concatenate(start)
-        self._cuts = np.cumsum([eq.lag.size for eq in equations])[:-1]
+        self._shapes = [eq.gradient.shape[:2] for eq in equations]
+        self._cuts = np.cumsum([m * k for m, k in self._shapes])[:-1]
+
+    def of_lag(self, lags: Sequence[Floats]) -> Floats:
+        """Return the pressures that belong to dilatations ``(m, k)`` of each solid."""
+        parts = [
+            (factor.swapaxes(1, 2) @ (eq.bulk @ (eq.volume[:, None] * lag)[:, :, None])).ravel()
+            for eq, factor, lag in zip(self._equations, self._factor, lags, strict=True)
+        ]
+        return np.concatenate(parts)
 
     def forces(self, q: Floats) -> Floats:
         """Return Bᵀ q."""
@@ -216,23 +255,28 @@ class _Volumes:
         """Return for each solid the dilatations that `u` has and `q` does not, ``(m, k)``."""
         parts = np.split(self._gaps(u, q), self._cuts)
         return tuple(
-            (factor @ part.reshape(*eq.lag.shape, 1))[:, :, 0] / eq.volume[:, None]
-            for eq, factor, part in zip(self._equations, self._factor, parts, strict=True)
+            (factor @ part.reshape(*shape, 1))[:, :, 0] / eq.volume[:, None]
+            for eq, factor, shape, part in zip(self._equations, self._factor, self._shapes, parts, strict=True)
         )
 
     def _gaps(self, u: Floats, q: Floats) -> Floats:
         parts = np.split(q, self._cuts)
         products = [
-            (c @ part.reshape(*eq.lag.shape, 1)).ravel()
-            for eq, c, part in zip(self._equations, self._compliance, parts, strict=True)
+            (c @ part.reshape(*shape, 1)).ravel()
+            for c, shape, part in zip(self._compliance, self._shapes, parts, strict=True)
         ]
         return np.asarray(self._B @ u - np.concatenate(products))
+
+
+def _inverses(matrices: Floats) -> Floats:
+    """Return the inverses of ``(m, k, k)``; most often k is 1, for which LAPACK takes ten times as long."""
+    return np.asarray(1.0 / matrices if matrices.shape[1] == 1 else np.linalg.inv(matrices), float)
 
 
 def _gradient_matrix(levels: TwoLevels, equations: list[VolumeEquations], gradients: list[Floats]) -> sp.csr_matrix:
     data, column, width = [], [], []
     for eq, gradient in zip(equations, gradients, strict=True):
-        m, k = eq.lag.shape
+        m, k = gradient.shape[:2]
         places = 3 * levels.fine.rank[eq.nodes][:, None, :] + np.arange(3, dtype=np.int32)[:, None]
         column.append(np.broadcast_to(places.reshape(m, 1, -1), gradient.shape).ravel())
         data.append(gradient.ravel())

@@ -1,20 +1,29 @@
 """The flexible generalised minimal residual method (Saad 1993).
 
-Flexible, as a preconditioner in single precision is not linear to the last digits of a double.
+Flexible, as a preconditioner in single precision is not linear to the last digits of a double. The directions are made
+orthogonal by kernels of our own: NumPy's products of vectors start threads each time, which on a busy machine takes
+longer than everything else.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+
+from turgor.fem.kernels import CHUNKS, parallel
 
 Floats = NDArray[np.float64]
 Preconditioner = Callable[[Floats], tuple[Floats, Floats]]
 
 RESTART = 60
 """Directions that are kept; then the method begins anew from where it is."""
+
+CANCELLED = 0.7
+"""A direction that shrinks below this part of itself is made orthogonal once more, as rounding has left it oblique
+(Daniel et al. 1976)."""
 
 
 def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: int) -> tuple[Floats, int, bool]:
@@ -34,17 +43,17 @@ def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: 
     Returns
     -------
     solution, iterations, converged
-        By the residual itself, not by its recursion.
+        By the residual that the products with the matrix leave.
     """
     solution, residual, done = np.zeros_like(right), right, 0
-    goal = accuracy * float(np.linalg.norm(right))
-    while float(np.linalg.norm(residual)) > goal and done < most:
+    goal = accuracy * _length(right)
+    while _length(residual) > goal and done < most:
         change, product, steps = _cycle(preconditioner, residual, goal, min(RESTART, most - done))
         solution, done = solution + change, done + steps
-        before, residual = float(np.linalg.norm(residual)), residual - product
-        if not float(np.linalg.norm(residual)) < before:
+        before, residual = _length(residual), residual - product
+        if not _length(residual) < before:
             return solution, done, False
-    return solution, done, float(np.linalg.norm(residual)) <= goal
+    return solution, done, _length(residual) <= goal
 
 
 def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: int) -> tuple[Floats, Floats, int]:
@@ -52,22 +61,17 @@ def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: 
 
     Returns the change, the product of the matrix with it, and how many directions were taken.
     """
-    size = float(np.linalg.norm(residual))
-    basis, improved, products = [residual / size], [], []
-    triangle = np.zeros((most, most))
+    size = _length(residual)
+    # What is not written to takes no memory.
+    basis, improved = np.empty((most + 1, len(residual))), np.empty((most, len(residual)))
+    basis[0] = residual / size
+    columns, triangle = np.zeros((most + 1, most)), np.zeros((most, most))
     rotations: list[tuple[float, float]] = []
     target = [size]
     for step in range(most):
-        found, direction = preconditioner(basis[step])
-        improved.append(found)
-        products.append(direction.copy())
-        column = np.zeros(step + 1)
-        for _ in range(2):  # once more, so that rounding leaves them orthogonal (Giraud et al. 2005)
-            part = np.array([known @ direction for known in basis])
-            for weight, known in zip(part, basis, strict=True):
-                direction -= weight * known
-            column += part
-        length = float(np.linalg.norm(direction))
+        improved[step], direction = preconditioner(basis[step])
+        column = _orthogonalised(basis[: step + 1], direction)
+        columns[: step + 2, step], length = column, float(column[-1])
         for k, (c, s) in enumerate(rotations):
             column[k : k + 2] = c * column[k] + s * column[k + 1], c * column[k + 1] - s * column[k]
         radius = float(np.hypot(column[step], length))
@@ -76,18 +80,67 @@ def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: 
         c, s = float(column[step]) / radius, length / radius
         rotations.append((c, s))
         column[step] = radius
-        triangle[: step + 1, step] = column
+        triangle[: step + 1, step] = column[: step + 1]
         target.append(-s * target[step])
         target[step] *= c
+        basis[step + 1] = direction / length if length else 0.0
         if abs(target[-1]) <= goal or length == 0.0:
             break
-        basis.append(direction / length)
     n = len(rotations)
     if n == 0:
         return np.zeros_like(residual), np.zeros_like(residual), 1
     weights = np.asarray(np.linalg.solve(triangle[:n, :n], target[:n]), float)
-    return _combined(weights, improved), _combined(weights, products), n
+    change, product = np.zeros_like(residual), np.zeros_like(residual)
+    _add_combined(improved, weights, change)
+    _add_combined(basis, columns[: n + 1, :n] @ weights, product)
+    return change, product, n
 
 
-def _combined(weights: Floats, vectors: list[Floats]) -> Floats:
-    return np.asarray(sum(weight * known for weight, known in zip(weights, vectors, strict=False)))
+def _orthogonalised(basis: Floats, direction: Floats) -> Floats:
+    """Take from `direction`, in place, its parts along the rows of `basis`; return these and the length left."""
+    parts = np.zeros(len(basis) + 1)
+    before = _length(direction)
+    for _ in range(2):
+        part = np.zeros((CHUNKS, len(basis)))
+        _project(basis, direction, part)
+        _add_combined(basis, -part.sum(axis=0), direction)
+        parts[:-1] += part.sum(axis=0)
+        parts[-1] = _length(direction)
+        if parts[-1] > CANCELLED * before:
+            break
+        before = parts[-1]
+    return parts
+
+
+def _length(vector: Floats) -> float:
+    squares = np.zeros((CHUNKS, 1))
+    _project(vector[None], vector, squares)
+    return float(np.sqrt(squares.sum()))
+
+
+@parallel
+def _project(basis, vector, out):  # type: ignore[no-untyped-def]
+    """Fill `out` ``(CHUNKS, n)`` with the products of the rows of `basis` with `vector`, chunk by chunk."""
+    n = len(vector)
+    for chunk in nb.prange(CHUNKS):
+        first, last = chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS
+        here = vector[first:last]
+        for k in range(len(basis)):
+            row = basis[k, first:last]
+            total = 0.0
+            for m in range(len(row)):
+                total += row[m] * here[m]
+            out[chunk, k] = total
+
+
+@parallel
+def _add_combined(basis, weights, out):  # type: ignore[no-untyped-def]
+    """Add the sum of the first rows of `basis`, one for each of `weights` and times it, to `out`."""
+    n = len(out)
+    for chunk in nb.prange(CHUNKS):
+        first, last = chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS
+        here = out[first:last]
+        for k in range(len(weights)):
+            row, weight = basis[k, first:last], weights[k]
+            for m in range(len(row)):
+                here[m] += weight * row[m]

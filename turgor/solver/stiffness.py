@@ -49,11 +49,11 @@ class Solution:
 class StiffnessSolver(ABC):
     """Solves with the stiffness of one state after another.
 
-    ``serves_again`` says whether it is worth while to go on with the stiffness of an earlier state.
+    ``cheap_again`` says whether a further solution with the same stiffness costs little beside the first.
     """
 
     name: ClassVar[str]
-    serves_again: ClassVar[bool] = True
+    cheap_again: ClassVar[bool] = True
 
     @abstractmethod
     def take_stiffness(self, system: System, state: State) -> None:
@@ -68,6 +68,14 @@ class StiffnessSolver(ABC):
     @abstractmethod
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the solution for a right-hand side ``(n,)``, to `accuracy` at least."""
+
+    def solution_again(self, system: System, right: Floats, state: State) -> Solution | None:
+        """Return the solution for the mixed problem's out-of-balance force of a later state.
+
+        ``None`` where a new stiffness gets on faster.
+        """
+        del state
+        return self.solution(system, right)
 
     @abstractmethod
     def solve(self, right: Floats) -> Floats:

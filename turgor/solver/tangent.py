@@ -131,15 +131,20 @@ class Tangent:
         self.system, self.linear = system, linear
         self.state, self.residual = state, progress.residuals[-1]
         factorise_tangent(system, linear, state, progress.residuals)
-        self.negative_pivots = linear.negative_pivots
         self._control, self._fraction, self._tolerance = control, fraction, progress.options.tolerance
         self._size, self._uses = 0.0, 0
         self.compliance: float | None = None
         if control is not None:
-            self._response = self._solve(-system.load_direction(state, system.growth(fraction)), ACCURATE)
+            growing = system.free_part(-system.load_direction(state, system.growth(fraction)))
+            self._response = linear.solution(system, growing, ACCURATE)
             self._measured = system.load_direction(state, control.weights)
             self.compliance = -float(np.vdot(self._measured, self._response.u))
         progress.tangents.append((self.residual, self.negative_pivots or 0))
+
+    @property
+    def negative_pivots(self) -> int | None:
+        """Number of negative eigenvalues, ``None`` if the solver cannot tell; of the tangent made last only."""
+        return self.linear.negative_pivots
 
     def solved(self, residual: Floats, pending: Floats | None) -> Step:
         """Return Newton's step from the state of the tangent, the `pending` given displacements imposed with it."""
@@ -157,10 +162,13 @@ class Tangent:
         ``None`` where it is not much shorter than the last one, or surfaces touch, which meet with their actual forces:
         a new tangent will get on faster.
         """
-        if self._uses == USES or not self.linear.serves_again or self.system.contact_force(state) > 0.0:
+        if self._uses == USES or self.system.contact_force(state) > 0.0:
+            return None
+        force = self.system.free_part(self.system.mixed_force(state, self.state))
+        found = self.linear.solution_again(self.system, -force, state)
+        if found is None:
             return None
         self._uses += 1
-        found = self._solve(-self.system.mixed_force(state, self.state))
         step = self._controlled(found, self.state, state, fraction)
         size = float(np.linalg.norm(step.du))
         # Written so that what is not a number is not shorter.
@@ -171,15 +179,14 @@ class Tangent:
 
     def is_sharp(self, residual: float) -> bool:
         """Whether a state that meets the tolerance is as good as Newton's own last step makes one."""
-        return self._uses == 0 or residual <= SHARP * self._tolerance
+        return self._uses == 0 or not self.linear.cheap_again or residual <= SHARP * self._tolerance
 
     def is_near(self, state: State) -> bool:
-        """Whether the tangent speaks for a state, too."""
+        """Whether the tangent speaks for a state, too, or has nothing to say."""
+        if self.negative_pivots is None and self._control is None:
+            return True
         away = float(np.linalg.norm(state.u - self.state.u))
         return self.residual <= NEAR or away <= NEARBY * float(np.linalg.norm(state.u))
-
-    def _solve(self, nodal: Floats, accuracy: float = FORCING) -> Solution:
-        return self.linear.solution(self.system, self.system.free_part(nodal), accuracy)
 
     def _controlled(self, found: Solution, base: State | None, state: State, fraction: float) -> Step:
         """Return the step from a state with which the linearised control holds too."""
