@@ -52,7 +52,7 @@ def test_one_more_solution_with_the_same_tangent_makes_the_third_order(tube):
         tangent = Tangent(tube, linear, start, 1.0, None, progress)
         newton = tangent.solved(tube.free_part(force), None)
         middle = tube.advanced(start, newton.du)
-        again = tangent.solved_again(middle, 1.0)
+        again = tangent.solved_again(middle, 1.0, 1.0)
         after = middle.u + again.du
         errors.append([np.abs(u - end.u).max() for u in (middle.u, after)])
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))

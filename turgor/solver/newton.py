@@ -152,7 +152,7 @@ def find_equilibrium(
         reached = max(relative, gap) <= options.tolerance and not moving
         step = None
         if tangent is not None and not moving and not (reached and tangent.is_sharp(relative)):
-            step = tangent.solved_again(state, fraction)
+            step = tangent.solved_again(state, fraction, relative)
         if reached and step is None:
             return _accepted(system, linear, state, fraction, control, tangent, progress)
         if tangent is None or step is None:

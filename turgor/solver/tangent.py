@@ -72,6 +72,9 @@ SHARP = 1e-2
 """Newton's last step goes far below the tolerance; steps with a tangent that is used again go on to this part of it, as
 long as they get on."""
 
+MUCH_LESS = 1e-2
+"""A residual above this part of the tangent's is not just what an iterative solver left."""
+
 USES = 6
 SHORTER = 0.5
 """How often a tangent is used again at most, and what each step with it has to be shorter by to be taken."""
@@ -156,13 +159,15 @@ class Tangent:
         self._size = float(np.linalg.norm(step.du))
         return step
 
-    def solved_again(self, state: State, fraction: float) -> Step | None:
-        """Return the step from a later state to where this tangent solves its mixed problem.
+    def solved_again(self, state: State, fraction: float, residual: float) -> Step | None:
+        """Return the step from a later state, with its relative residual, to where this tangent solves its mixed problem.
 
         ``None`` where it is not much shorter than the last one, or surfaces touch, which meet with their actual forces:
         a new tangent will get on faster.
         """
         if self._uses == USES or self.system.contact_force(state) > 0.0:
+            return None
+        if not self.linear.cheap_again and not residual <= MUCH_LESS * self.residual:
             return None
         force = self.system.free_part(self.system.mixed_force(state, self.state))
         found = self.linear.solution_again(self.system, -force, state)
