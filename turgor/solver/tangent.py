@@ -160,7 +160,7 @@ class Tangent:
         return step
 
     def solved_again(self, state: State, fraction: float, residual: float) -> Step | None:
-        """Return the step from a later state, with its relative residual, to where this tangent solves its mixed problem.
+        """Return the step from a later state, given its residual, to where this tangent solves its mixed problem.
 
         ``None`` where it is not much shorter than the last one, or surfaces touch, which meet with their actual forces:
         a new tangent will get on faster.
