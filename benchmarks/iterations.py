@@ -1,6 +1,6 @@
 """Factorisations on the way to the loads of several actuators, and the iterations made with them.
 
-    .venv/bin/python benchmarks/iterations.py
+    .venv/bin/python benchmarks/iterations.py [--kept-from 0]
 
 Prints the rows of the table in docs/theory/formulation.md: the factorisations and the iterations of each state, those
 of attempts that failed on the way left out. With PYTHONPATH at the checkout of another commit it counts that one's.
@@ -8,6 +8,7 @@ of attempts that failed on the way left out. With PYTHONPATH at the checkout of 
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 import turgor as tg
@@ -18,6 +19,7 @@ from turgor.fem.system import System
 from turgor.materials.models.neo_hookean import NeoHookean
 from turgor.materials.volumetric import Quadratic
 from turgor.mesh.structured import rectangle
+from turgor.solver import tangent
 from turgor.solver.path import solve_path
 from turgor.study.build import system_of
 from turgor.study.materials import build_materials
@@ -59,6 +61,11 @@ def actuator(name: str, changes: list[str]) -> System:
 
 def main() -> None:
     """Print one row a case."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--kept-from", type=int, default=tangent.KEPT_FROM, help="unknowns in space from which tangents serve again"
+    )
+    tangent.KEPT_FROM = parser.parse_args().kept_from
     print("| case | factorisations (iterations) |\n|---|---|")
     ends = [counts(strip(strength), [1.0]) for strength in (1.0, 5.0, 10.0)]
     print(f"| elastica, end force 1, 5, 10 EI/L², in one step | {', '.join(ends)} |")

@@ -75,6 +75,13 @@ long as they get on."""
 MUCH_LESS = 1e-2
 """A residual above this part of the tangent's is not just what an iterative solver left."""
 
+KEPT_FROM = 30_000
+"""Unknowns of a model in space from which factors are used again.
+
+Three or four steps with them replace one of Newton's. With fewer unknowns, and in plane models of any size, these cost
+as much as a factorisation, or more.
+"""
+
 USES = 6
 SHORTER = 0.5
 """How often a tangent is used again at most, and what each step with it has to be shorter by to be taken."""
@@ -165,9 +172,7 @@ class Tangent:
         ``None`` where it is not much shorter than the last one, or surfaces touch, which meet with their actual forces:
         a new tangent will get on faster.
         """
-        if self._uses == USES or self.system.contact_force(state) > 0.0:
-            return None
-        if not self.linear.cheap_again and not residual <= MUCH_LESS * self.residual:
+        if self._uses == USES or not self._may_pay(residual) or self.system.contact_force(state) > 0.0:
             return None
         force = self.system.free_part(self.system.mixed_force(state, self.state))
         found = self.linear.solution_again(self.system, -force, state)
@@ -192,6 +197,12 @@ class Tangent:
             return True
         away = float(np.linalg.norm(state.u - self.state.u))
         return self.residual <= NEAR or away <= NEARBY * float(np.linalg.norm(state.u))
+
+    def _may_pay(self, residual: float) -> bool:
+        """Whether it may cost less to solve with this tangent again than with a new one, at a state's residual."""
+        if not self.linear.cheap_again:
+            return residual <= MUCH_LESS * self.residual
+        return self.system.mesh.dimension == 3 and self.system.n_dofs >= KEPT_FROM
 
     def _controlled(self, found: Solution, base: State | None, state: State, fraction: float) -> Step:
         """Return the step from a state with which the linearised control holds too."""
