@@ -298,6 +298,13 @@ def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
             assert reason in caplog.text
 
 
+def test_it_is_chosen_where_factors_would_not_fit(monkeypatch):
+    system = sphere("tet10", 1)
+    for free_mb, expected in ((1e3, LinearSolver), (0.1, Iterative)):
+        monkeypatch.setattr(choice, "free_memory_mb", lambda free=free_mb: free)
+        assert isinstance(make_stiffness_solver(system), expected)
+
+
 def test_an_unknown_path_is_refused():
     with pytest.raises(InputError, match="iterative"):
         make_stiffness_solver(sphere("tet10", 1), "krylov")

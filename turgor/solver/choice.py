@@ -8,7 +8,7 @@ from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.fem.system import System
 from turgor.solver.iterative import Iterative
-from turgor.solver.linear import make_linear_solver
+from turgor.solver.linear import free_memory_mb, make_linear_solver
 from turgor.solver.stiffness import StiffnessSolver
 
 log = logger("solver")
@@ -21,6 +21,9 @@ ITERATIVE_FROM = 200_000
 It is faster from a fifth of that on, but cannot tell whether a state is stable.
 """
 
+FACTORS_KB = 14.0
+"""Memory that a factorisation takes for an unknown, kB, in space at the sizes that fill a machine's memory."""
+
 
 def make_stiffness_solver(system: System, path: LinearPath = "auto") -> StiffnessSolver:
     """Return what solves the linear problems of a system, and say in the log what and why.
@@ -31,7 +34,7 @@ def make_stiffness_solver(system: System, path: LinearPath = "auto") -> Stiffnes
         The actuator.
     path
         ``direct``: factorise; ``iterative``: a Krylov method where it is able to; ``auto``: the latter from
-        :data:`ITERATIVE_FROM` unknowns on.
+        :data:`ITERATIVE_FROM` unknowns on, and where the factors would not fit into the memory that is free.
 
     Raises
     ------
@@ -45,7 +48,8 @@ def make_stiffness_solver(system: System, path: LinearPath = "auto") -> Stiffnes
             value=path,
             expected="auto, direct or iterative",
         )
-    wanted = path == "iterative" or (path == "auto" and system.n_dofs >= ITERATIVE_FROM)
+    short = system.n_dofs * FACTORS_KB > 2**10 * free_memory_mb()
+    wanted = path == "iterative" or (path == "auto" and (short or system.n_dofs >= ITERATIVE_FROM))
     reason = not_iterative(system)
     if wanted and reason is None:
         log.info("linear solver: %s; it cannot tell whether a state is stable", Iterative.name)

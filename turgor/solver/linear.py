@@ -92,10 +92,14 @@ def solver_in_use() -> type[LinearSolver]:
     return Mumps if is_available("mumps") else SuperLU
 
 
+def free_memory_mb() -> float:
+    """Return how much memory the machine has free, MB."""
+    return float(psutil.virtual_memory().available) / 2**20
+
+
 def warn_of_memory(needed_mb: float) -> None:
     """Say in the log before a factorisation that it takes more memory, MB, than the machine has free."""
-    free_mb = psutil.virtual_memory().available / 2**20
-    if needed_mb > free_mb:
+    if needed_mb > (free_mb := free_memory_mb()):
         log.warning(
             "the factorisation needs about %.0f MB of memory and %.0f MB are free: the run may be slow or be ended by "
             "the system; a coarser mesh or a symmetric half needs less",
