@@ -47,9 +47,6 @@ With less, the pressures are harder to find; with more, A is harder to smooth.
 MOST_ITERATIONS = 180
 """Of one linear problem; then it is factorised."""
 
-LEFT = 1.0
-"""What is out of balance up to so many times what the last step may have left is hardly more than that."""
-
 FAILURES = 3
 """Tangents on which the method has failed, after which all are factorised."""
 
@@ -98,7 +95,7 @@ class Iterative(StiffnessSolver):
     def solution_again(self, system: System, right: Floats, state: State) -> Solution | None:
         """Return the step from a later state, unless more is out of balance there than the last step left."""
         problem = None if self._factorised else self._problem(right, state)
-        if problem is not None and not np.linalg.norm(problem.residual) <= LEFT * self._left:
+        if problem is not None and not np.linalg.norm(problem.residual) <= self._left:
             return None
         return self._solution(system, right, problem, FORCING)
 
@@ -269,7 +266,7 @@ class _Volumes:
 
 
 def _inverses(matrices: Floats) -> Floats:
-    """Return the inverses of ``(m, k, k)``; most often k is 1, for which LAPACK takes ten times as long."""
+    """Return the inverses of ``(m, k, k)``; most often k is 1, for which LAPACK takes far longer."""
     return np.asarray(1.0 / matrices if matrices.shape[1] == 1 else np.linalg.inv(matrices), float)
 
 

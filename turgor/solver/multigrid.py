@@ -3,8 +3,8 @@
 One cycle is an approximate inverse. Its coarse space, the piecewise linear displacements, contains the rigid-body modes
 and nearly the soft bending modes; what it lacks is rough, and one sweep of Gauss–Seidel smooths that (Helenbrook,
 Mavriplis and Atkins 2003). A sweep before the correction as well would make the cycle symmetric, which GMRES does not
-need; it saves a seventh of the iterations and costs two fifths of each. The matrix is in single precision, which halves
-the memory that goes by.
+need, and would cost more than it saves in iterations. The matrix is in single precision, which halves the memory that
+goes by.
 """
 
 from __future__ import annotations
