@@ -78,8 +78,8 @@ MUCH_LESS = 1e-2
 KEPT_FROM = 30_000
 """Unknowns of a model in space from which factors are used again.
 
-Three or four steps with them replace one of Newton's. With fewer unknowns, and in plane models of any size, they cost as
-much as a factorisation, or more.
+Three or four steps with them replace one of Newton's. With fewer unknowns, and in plane models of any size, they cost
+as much as a factorisation, or more.
 """
 
 USES = 6
