@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_bodies import half_chamber, merged, shifted_mesh
@@ -10,13 +12,13 @@ from samples import neo_hookean
 from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact
 from turgor.fem.loads import Force, Gravity, Pressure
 from turgor.fem.reaction import Reactions
-from turgor.fem.rigid import Cylinder
+from turgor.fem.rigid import Cylinder, Plane
 from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, Support
 from turgor.fem.system import System
-from turgor.mesh.faces import boundary_faces
+from turgor.mesh.faces import boundary_faces, rim_edges
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.structured import box, rectangle
+from turgor.mesh.structured import box, quarter_ring, rectangle, shell_octant, tube_sector
 from turgor.solver.path import solve_path
 
 HEAVY = neo_hookean(0.5, 20.0, density=1.1e-9)
@@ -92,6 +94,85 @@ def test_what_a_dynamometer_feels_is_what_the_supports_carry(own: tuple[ContactC
     )
     felt_turning = np.array(touches["rod"].torque) + np.cross(rod.body.reference_point, felt)
     assert turning[1] == pytest.approx(felt_turning[1], abs=1e-6 * felt[2] * 12.0)
+
+
+def cut_area(places: np.ndarray, edges: np.ndarray) -> float:
+    """Area that edges of three nodes, at `places` ``(n_points, 2)``, sweep about the origin: that of parabolas."""
+    a, b, m = np.moveaxis(places[edges], 1, 0)
+    swept = 0.5 * cross(a, b) + 2.0 / 3.0 * cross(m - 0.5 * (a + b), b - a)
+    return abs(float(swept.sum()))
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def opening(mesh: Mesh, u: np.ndarray, axis: int) -> float:
+    """Area of the opening of the surface ``inner`` in the plane across an axis, its nodes displaced by `u`."""
+    edges = rim_edges(mesh.surface("inner"))
+    edges = edges[(mesh.points[edges][:, :, axis] == 0.0).all(axis=1)]
+    return cut_area(np.delete(mesh.points + u, axis, axis=1), edges)
+
+
+@pytest.mark.parametrize("blocked", [False, True], ids=["free", "against a plate"])
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_the_mount_of_a_dome_carries_what_the_air_pushes_it_off_with(kind: str, blocked: bool) -> None:
+    # Glued to a plate with its rim; the octant's planes of symmetry carry the air's push on the half that is left out.
+    mesh, p = shell_octant(1.0, 1.5, 1, kind), 0.03
+    plate = RigidContact(Plane((0.0, 0.0, 1.52), (0.0, 0.0, -1.0)), "outer", label="plate")
+    supports = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
+    loads = [Pressure("inner", p)]
+    system = System(mesh, {"body": neo_hookean(0.1, 100.0)}, supports, loads, contact=[plate] if blocked else [])
+    force, torque, u = carried(system)
+    felt = np.zeros(3)
+    if blocked:
+        (touch,) = system.touches(solve_path(system, [1.0])[0].state)
+        felt = np.array(touch.force)
+        assert felt[2] > 0.05 * p
+    assert np.abs(u).max() > 0.05
+    pushed = p * np.array([opening(mesh, u, axis) for axis in range(3)])
+    assert pushed[2] == pytest.approx(p * np.pi / 4, rel=1e-2)
+    assert sum(force.values()) == pytest.approx(felt - pushed, abs=1e-6 * p)
+    assert force["z0"][2] == pytest.approx(felt[2] - pushed[2], abs=1e-6 * p)
+    # The octant mirrors itself in the plane x = y.
+    total = sum(torque.values())
+    assert total[0] == pytest.approx(-total[1], abs=1e-3 * p)
+
+
+def test_the_mount_of_a_section_carries_what_the_air_pushes_it_off_with() -> None:
+    mesh, p = quarter_ring(1.0, 1.5, 2), 0.03
+    material, loads = {"body": neo_hookean(0.1, 100.0)}, [Pressure("inner", p)]
+    dome = System(mesh, material, [Clamped("y0")], loads, section=Axisymmetric())
+    force, _, u = carried(dome)
+    assert np.abs(u).max() > 0.05
+    assert force["y0"] == pytest.approx([0.0, -p * np.pi, 0.0], abs=1e-8 * p)
+    arch = System(mesh, material, [Clamped("y0"), Sliding("x0")], loads, section=PlaneStrain(7.0))
+    force, _, u = carried(arch)
+    crown = mesh.surface_nodes("x0")[np.argmin(mesh.points[mesh.surface_nodes("x0"), 1])]
+    height = mesh.points[crown, 1] + u[crown, 1]
+    assert height > 1.05
+    assert sum(force.values()) == pytest.approx([-7.0 * p * height, -7.0 * p, 0.0], abs=1e-8 * p)
+
+
+def test_planes_of_symmetry_through_a_cap_carry_what_the_air_pushes_its_other_half_with() -> None:
+    tube = tube_sector(1.0, 1.5, 3.0, 1)
+    edges = rim_edges(tube.surface("inner"))
+    top = edges[(tube.points[edges][..., 2] == 3.0).all(axis=1)]
+    mesh, p = replace(tube, caps={"plug": top}), 0.02
+    supports = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
+    system = System(mesh, {"body": neo_hookean(0.1, 100.0)}, supports, [Pressure("inner", p)])
+    force, _, u = carried(system)
+    places = mesh.points + u
+    assert force["z0"][2] == pytest.approx(-p * opening(mesh, u, 2), rel=1e-6)
+    assert np.abs(u[np.unique(top), 2]).max() > 0.01
+    for axis, name in enumerate(("x0", "y0")):
+        # Wall and cap cut the plane along the wall's rim and a straight line to the middle of the cap, on the axis,
+        # where the other half of the cap holds it with the rest.
+        field = system.cavities[0].field
+        height = field.caps[0].places(places - field.origin)[len(field.caps[0].nodes), 2]
+        end = places[next(node for node in np.unique(top) if mesh.points[node, axis] == 0.0)]
+        area = opening(mesh, u, axis) + 0.5 * end[1 - axis] * height
+        assert force[name][axis] == pytest.approx(-p * area, rel=3e-3)
 
 
 def test_what_two_supports_hold_together_is_counted_once() -> None:

@@ -49,6 +49,14 @@ class AirPressure(Unlagged):
         if pressure != 0.0:
             add_at_nodes(self.nodes, -pressure * self._enclosed.gradient(self._places(state.u)), out)
 
+    def force_on_closing(self, state: State, out: Floats) -> None:
+        """Add the part of the force that the air's push on the planes that close the cavity has in it, N.
+
+        It acts across these planes on the rim, which is held there. What else holds it feels the push on the wall only.
+        """
+        x, pressure = self._places(state.u), state.loads[self.channel]
+        add_at_nodes(self.nodes, pressure * (self._enclosed.traction(x) - self._enclosed.gradient(x)), out)
+
     def conjugate(self, state: State) -> float:
         """Return V, mm³."""
         return self._enclosed.volume(self._places(state.u))

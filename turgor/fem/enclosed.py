@@ -35,6 +35,14 @@ class EnclosedVolume(Protocol):
         """Return the derivative of each face's share by its nodes, ``(k, n, d)``, mm²."""
         ...
 
+    def traction(self, x: Floats) -> Floats:
+        """Return what a unit pressure on each face pushes its nodes with, ``(k, n, d)``, mm².
+
+        All together it is the gradient, but for the rim of an opening across the plane that closes it: the gradient
+        holds for a rim that stays in its plane.
+        """
+        ...
+
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives of each face's share, ``(k, n d, n d)``, mm."""
         ...
@@ -56,6 +64,10 @@ class FaceVolume:
     def gradient(self, x: Floats) -> Floats:
         """Return the derivative by the nodes, ``(k, n, 3)``."""
         return np.asarray(_gradients(x - self._origin, self.nodes, *self._rule))
+
+    def traction(self, x: Floats) -> Floats:
+        """Return what a unit pressure pushes the nodes with, ``(k, n, 3)``."""
+        return _tractions(x[self.nodes], *self._rule[:3])
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 3 n, 3 n)``."""
@@ -81,13 +93,11 @@ class CapVolume:
 
     def gradient(self, x: Floats) -> Floats:
         """Return the derivative by the nodes of the rim, ``(1, n, 3)``."""
-        shares = _gradients(self._places(x), self._cap.faces, *self._rule)
-        faces = self._cap.faces.ravel()
-        columns = [
-            matrix.T @ np.bincount(faces, shares[:, :, axis].ravel(), minlength=matrix.shape[0])
-            for axis, matrix in enumerate(self._cap.weights)
-        ]
-        return np.stack(columns, axis=1)[None]
+        return self._on_rim(_gradients(self._places(x), self._cap.faces, *self._rule))
+
+    def traction(self, x: Floats) -> Floats:
+        """Return what a unit pressure pushes the rim with, ``(1, n, 3)``."""
+        return self._on_rim(_tractions(self._places(x)[self._cap.faces], *self._rule[:3]))
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(1, 3 n, 3 n)``."""
@@ -104,6 +114,15 @@ class CapVolume:
                 out[:, i, :, j] = (weights[i].T @ whole.tocsr() @ weights[j]).toarray()
         return out.reshape(1, 3 * n, 3 * n)
 
+    def _on_rim(self, shares: Floats) -> Floats:
+        """Return by the nodes of the rim ``(1, n, 3)`` what is given by those of the faces ``(k, 6, 3)``."""
+        faces = self._cap.faces.ravel()
+        columns = [
+            matrix.T @ np.bincount(faces, shares[:, :, axis].ravel(), minlength=matrix.shape[0])
+            for axis, matrix in enumerate(self._cap.weights)
+        ]
+        return np.stack(columns, axis=1)[None]
+
     def _places(self, x: Floats) -> Floats:
         return self._cap.places(x - self._origin)
 
@@ -119,7 +138,7 @@ class EdgeVolume:
 
     def __init__(self, nodes: Ints, field: VolumeField, thickness: float) -> None:
         self.nodes = nodes
-        self._origin = field.origin
+        self._origin, self._thickness = field.origin, thickness
         along_x, along_y = thickness * field.axes / field.axes.sum()
         # The share of an edge is the bilinear form x · B y of its nodal coordinates.
         self._form = along_x * _ND - along_y * _ND.T
@@ -133,6 +152,11 @@ class EdgeVolume:
         """Return the derivative by the nodes, ``(k, 3, 2)``."""
         places = (x - self._origin)[self.nodes]
         return np.stack([places[:, :, 1] @ self._form.T, places[:, :, 0] @ self._form], axis=2)
+
+    def traction(self, x: Floats) -> Floats:
+        """Return what a unit pressure pushes the nodes with, ``(k, 3, 2)``."""
+        places = self._thickness * x[self.nodes]
+        return np.stack([places[:, :, 1] @ _ND.T, -places[:, :, 0] @ _ND.T], axis=2)
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 6, 6)``: the same for every edge and position."""
@@ -160,6 +184,12 @@ class RevolvedVolume:
         by_height = math.pi * np.einsum("ka,kb,abc->kc", r, r, _NND, optimize=True)
         return np.stack([by_radius, by_height], axis=2)
 
+    def traction(self, x: Floats) -> Floats:
+        """Return what a unit pressure pushes the nodes with, ``(k, 3, 2)``."""
+        r = x[self.nodes][:, :, 0]
+        sideways = 2.0 * math.pi * np.einsum("kb,kci,abc->kai", r, x[self.nodes], _NND, optimize=True)
+        return np.stack([sideways[:, :, 1], -sideways[:, :, 0]], axis=2)
+
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 6, 6)``."""
         r, y = np.moveaxis(x[self.nodes], 2, 0)
@@ -168,6 +198,12 @@ class RevolvedVolume:
         mixed = 2.0 * math.pi * np.einsum("kb,abc->kac", r, _NND)
         hessian[:, :, 0, :, 1], hessian[:, :, 1, :, 0] = mixed, mixed.swapaxes(1, 2)
         return hessian.reshape(-1, 6, 6)
+
+
+def _tractions(places: Floats, shape: Floats, gradient: Floats, weights: Floats) -> Floats:
+    """Return ∫ N n dA over faces with nodes at `places` ``(k, n, 3)``, by their nodes, ``(k, n, 3)``."""
+    first, second = np.einsum("qar,kai->rkqi", gradient, places)
+    return np.asarray(np.einsum("q,qa,kqi->kai", weights, shape, np.cross(first, second)))
 
 
 @nb.njit(cache=True, fastmath=FASTMATH, inline="always")

@@ -25,7 +25,8 @@ class Reactions:
     At a held node the sum of all other terms, ∂Π/∂u, is what holds it. Where several supports hold one node it is a sum
     λ₁d₁ + λ₂d₂ + … along their directions, and the one with the least Σλ² is taken: along a direction that two of them
     hold, each carries half. A bed of springs carries minus its own force. All reactions together balance the loads and
-    the rigid bodies to the tolerance of the solver.
+    the rigid bodies to the tolerance of the solver. The air pushes on the walls of a cavity, not on the planes that
+    close it for its volume: the support around an inlet carries what pushes the body off it.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ class Reactions:
         The torque is about ``about_mm``, the centroid of the surface at rest. Added up over the full turn of a body of
         revolution, nothing but a force along the axis is left.
         """
-        holding = self._system.forces(state)[0]
+        holding = self._system.forces(state)[0] - self._on_closing(state)
         nodal = {name: np.zeros_like(state.u) for name in self.names}
         for name, nodes, share in self._shares:
             nodal[name][nodes] += np.einsum("kij,kj->ki", share, holding[nodes])
@@ -54,6 +55,14 @@ class Reactions:
             bed.force(state, pull)
             nodal[name] -= pull
         return {name: self._resultants(state, name, force) for name, force in nodal.items()}
+
+    def _on_closing(self, state: State) -> Floats:
+        """Return the force that planes have in ∂Π/∂u which close cavities, ``(n_points, d)``, N."""
+        force = np.zeros_like(state.u)
+        for cavity in self._system.cavities:
+            for air in (cavity, *cavity.caps):
+                air.force_on_closing(state, force)
+        return force
 
     def _resultants(self, state: State, name: str, nodal: Floats) -> dict[str, Any]:
         about, force = self._about[name], in_space(self._system.body_part(nodal))
