@@ -21,7 +21,7 @@ def check_contact(term, state):
     slope = np.vdot(force_of(term, state), direction)
     assert term.touch(state).overlap > 1e-3
     assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-6)
-    nodes, packed = term.blocks(state, term.lagged_at(state.u, state.loads))
+    nodes, packed = term.blocks(state, term.lagged_at(state))
     assert len(nodes) > 1
     product = np.zeros_like(state.u)
     block_products(nodes, packed, direction, product)

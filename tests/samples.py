@@ -51,7 +51,7 @@ def check_derivatives(term, state):
     assert slope == pytest.approx(differences(term.energy, state, direction), rel=1e-7)
 
     packed = np.empty((len(term.nodes), packed_size(3 * term.nodes.shape[1])))
-    term.stiffness(state, term.lagged_at(state.u, state.loads), packed)
+    term.stiffness(state, term.lagged_at(state), packed)
     product = np.zeros(state.u.shape)
     block_products(term.nodes, packed, direction, product)
     expected = differences(force, state, direction)

@@ -1,6 +1,6 @@
 """The PneuNet geometry study: the finger to 50 kPa, the force of its blocked tip, and every trend that it reports.
 
-    .venv/bin/python benchmarks/studies/pneunet.py [--only NAME …] [--size 3]
+    .venv/bin/python benchmarks/studies/pneunet.py [--only NAME …] [--size 3] [--no-self-contact]
 
 Prints Markdown: of the finger of eight chambers bending angle and tip force by pressure (`--only published`), and a
 table of variants of a finger of three. Halves in Dragon Skin 30 unless said otherwise, chambers free to meet; the force
@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 
 import turgor as tg
 from turgor.materials.library import get
+from turgor.solver.events import Event
 from turgor.solver.path import PathOptions
 
 FULL = 50.0
@@ -75,8 +76,8 @@ VARIANTS = (
 class Found:
     """What a variant does as far as it goes: bending angle in °, contact in mm², forces in N, pressures in kPa.
 
-    `overlap` is the largest at any state of the three runs, in parts of the wall, `crossing` the number of states in
-    which the independent look finds surfaces that cross.
+    `limits` says of each run whether it ends at a limit of the pressure; `overlap` is the largest at any state of the
+    three, in parts of the wall, `crossing` the number of states in which the independent look sees surfaces cross.
     """
 
     bending: float
@@ -84,6 +85,7 @@ class Found:
     touching: float
     below: float
     reached: tuple[float, float, float]
+    limits: tuple[bool, bool, bool]
     elements: int
     overlap: float
     crossing: int
@@ -93,13 +95,14 @@ def finger(variant: Variant, chambers: int = 3) -> tg.PneuNet:
     return tg.PneuNet(**{"chambers": chambers, **variant.changes}, symmetric=True)
 
 
-def inflated(variant: Variant, shape: tg.PneuNet, size: str, plate: float | None = None) -> tg.Path:
-    """Inflate as far as it goes, free or above a plate so many mm under the bottom."""
+def inflated(variant: Variant, shape: tg.PneuNet, size: str, plate: float | None = None, own: bool = True) -> tg.Path:
+    """Inflate as far as it goes, free or above a plate so many mm under the bottom, with self-contact or without."""
     under = {"type": "plane", "name": "plate", "point": ["0 mm", "0 mm", f"{-(plate or 0.0)} mm"], "normal": [0, 0, 1]}
+    bodies = [] if plate is None else [{**under, "surface": "outer"}]
     sheet = {"between": ["body", "base"], "youngs_modulus": "2 GPa", "thickness": "0.1 mm"}
     model = tg.Model(
         shape.mesh(size=size),
-        contact={"self": True, "bodies": [] if plate is None else [{**under, "surface": "outer"}]},
+        contact={"self": own, "bodies": bodies} if own or bodies else None,
         sheets=[sheet] if variant.paper_layer else [],
         measures=["bending_angle", "tip_position"],
         body=get(variant.rubber),
@@ -117,15 +120,16 @@ def force(path: tg.Path, row: int = -1) -> float:
     return 2.0 * float(path.history[row]["contact_plate_force_N"])
 
 
-def measured(variant: Variant, size: str) -> Found:
+def measured(variant: Variant, size: str, own: bool) -> Found:
     shape = finger(variant)
-    free, touching, below = (inflated(variant, shape, size, plate) for plate in (None, TOUCHING, BELOW))
+    free, touching, below = (inflated(variant, shape, size, plate, own) for plate in (None, TOUCHING, BELOW))
     return Found(
         bending=float(free.bending_angle.magnitude[-1]),
-        contact=float(free.history[-1]["contact_self_area_mm2"]),
+        contact=float(free.history[-1].get("contact_self_area_mm2", 0.0)),
         touching=force(touching),
         below=force(below),
         reached=tuple(float(path.pressure.magnitude[-1]) for path in (free, touching, below)),
+        limits=tuple(path.history[-1]["event"] == Event.LIMIT for path in (free, touching, below)),
         elements=free.mesh.n_cells,
         overlap=max(most(path, "overlap_per_wall") for path in (free, touching, below)),
         crossing=sum(crossings(path) for path in (free, touching, below)),
@@ -134,7 +138,7 @@ def measured(variant: Variant, size: str) -> Found:
 
 def most(path: tg.Path, fact: str) -> float:
     """Return the largest value that a fact of any contact has in any state."""
-    return max(float(value) for row in path.history for key, value in row.items() if key.endswith(fact))
+    return max((float(value) for row in path.history for key, value in row.items() if key.endswith(fact)), default=0.0)
 
 
 def crossings(path: tg.Path) -> int:
@@ -165,11 +169,12 @@ def change(value: float, base: float, reached: float) -> str:
     return "same" if abs(value - base) <= CLEAR * abs(base) else "more" if value > base else "less"
 
 
-def cell(value: float, reached: float, digits: int) -> str:
-    return f"{value:.{digits}f}" + ("" if reached >= 0.999 * FULL else f" (at {reached:.3g} kPa)")
+def cell(value: float, reached: float, limit: bool, digits: int) -> str:
+    end = "limit" if limit else "stops"
+    return f"{value:.{digits}f}" + ("" if reached >= 0.999 * FULL else f" ({end} at {reached:.3g} kPa)")
 
 
-def trends(variants: list[Variant], size: str) -> None:
+def trends(variants: list[Variant], size: str, own: bool) -> None:
     """Print the table of variants against the first."""
     print(
         "| variant | bending, ° | contact, mm² | force, plate touching, N | plate 8 mm below, N | paper | ours | "
@@ -179,7 +184,7 @@ def trends(variants: list[Variant], size: str) -> None:
     base: Found | None = None
     for variant in [BASE, *variants]:
         begun = time.perf_counter()
-        found = measured(variant, size)
+        found = measured(variant, size, own)
         free, touching, below = found.reached
         base = base or found
         ours = [
@@ -187,9 +192,12 @@ def trends(variants: list[Variant], size: str) -> None:
             change(found.touching, base.touching, touching),
             change(found.below, base.below, below),
         ]
-        forces = f"{cell(found.touching, touching, 3)} | {cell(found.below, below, 3)}"
+        bending, forces = (
+            cell(found.bending, free, found.limits[0], 1),
+            f"{cell(found.touching, touching, found.limits[1], 3)} | {cell(found.below, below, found.limits[2], 3)}",
+        )
         print(
-            f"| {variant.name} | {cell(found.bending, free, 1)} | {found.contact:.1f} | {forces} | "
+            f"| {variant.name} | {bending} | {found.contact:.1f} | {forces} | "
             f"{variant.bending}, {variant.force} | {', '.join(ours)} | {100.0 * found.overlap:.2f} | "
             f"{found.crossing} | {time.perf_counter() - begun:.0f} |",
             flush=True,
@@ -200,6 +208,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", action="append", help=f"'{PUBLISHED}' or the name of a variant; may be repeated")
     parser.add_argument("--size", default="3", help="element size, mm")
+    parser.add_argument("--no-self-contact", action="store_true", help="variants pass through themselves")
     chosen = parser.parse_args()
     names = [PUBLISHED, *(variant.name for variant in VARIANTS)]
     unknown = set(chosen.only or ()) - set(names)
@@ -210,7 +219,7 @@ def main() -> None:
         published(f"{chosen.size} mm")
     variants = [variant for variant in VARIANTS if variant.name in wanted]
     if variants:
-        trends(variants, f"{chosen.size} mm")
+        trends(variants, f"{chosen.size} mm", not chosen.no_self_contact)
 
 
 if __name__ == "__main__":

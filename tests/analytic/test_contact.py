@@ -56,7 +56,7 @@ def contact_pressure(term, state):
     skin = term.skin
     x = np.einsum("qa,fai->fqi", skin.shape, (skin.points + state.u)[skin.faces])
     stiffness = state.penalty * STIFFNESS * (skin.load / skin.grip)[:, None]
-    return x[..., 0].ravel(), -(stiffness * term.lagged_at(state.u, state.loads)).ravel()
+    return x[..., 0].ravel(), -(stiffness * term.lagged_at(state)).ravel()
 
 
 @pytest.mark.parametrize("kind", KINDS)

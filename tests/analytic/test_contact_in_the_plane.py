@@ -9,11 +9,12 @@ from samples import neo_hookean
 
 from turgor.fem.contact.skin import STIFFNESS
 from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
-from turgor.fem.contact.term import LARGEST_OVERLAP
+from turgor.fem.contact.term import LARGEST_OVERLAP, WIDEST_MARGIN
 from turgor.fem.rigid import Plane, Sphere
 from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Clamped, Prescribed, Sliding
 from turgor.fem.system import System
+from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import rectangle
 from turgor.solver.path import solve_path
@@ -43,7 +44,7 @@ def pressed(section, radius: float, depth: float, length: float) -> tuple[float,
     term, skin = system.contacts[0], system.contacts[0].skin
     x = np.einsum("qa,fa->fq", skin.shape, (mesh.points + state.u)[skin.faces][:, :, 0]).ravel()
     stiffness = state.penalty * STIFFNESS * (skin.load / skin.grip)[:, None]
-    pressure = -(stiffness * term.lagged_at(state.u, state.loads)).ravel()
+    pressure = -(stiffness * term.lagged_at(state)).ravel()
     inside = x < 0.9 * x[pressure > 0.0].max()
     assert inside.sum() > 15
     # the square of the pressure falls linearly with the square of the place
@@ -86,7 +87,7 @@ def test_patch_of_uniform_stress_across_meshes_that_do_not_match(section, kind, 
     assert np.sqrt(np.mean((stress - mean) ** 2)) < 1e-2 * abs(mean[1])
 
 
-def test_contact_is_made_stiffer_where_only_the_independent_look_sees_too_much(monkeypatch):
+def test_surfaces_press_sooner_where_only_the_independent_look_sees_too_much(monkeypatch, caplog):
     low, high = rectangle((1.0, 0.5), (3, 1), "quad9"), rectangle((1.0, 0.5), (4, 2), "quad9")
     mesh = merged(low=low, high=shifted_mesh(high, y=0.5))
     supports = [Sliding("low-x0"), Sliding("high-x0"), Sliding("low-y0"), Prescribed("high-y1", (None, -0.1))]
@@ -95,11 +96,72 @@ def test_contact_is_made_stiffer_where_only_the_independent_look_sees_too_much(m
     assert not system.seen_to_overlap(plain)
     looks = []
     monkeypatch.setattr(system, "seen_to_overlap", lambda state: looks.append(state) or True)
-    stiffer = solve_path(system, [1.0])[0].state
-    assert len(looks) == 2, "an end is put to it"
-    assert stiffer.penalty >= 4.0 * plain.penalty
-    overlap, before = (system.touches(state)[0].overlap for state in (stiffer, plain))
-    assert overlap < 0.5 * before
+    found = solve_path(system, [1.0])[0]
+    assert len(looks) == 5, "an end is put to it"
+    assert "still seen to overlap" in caplog.text
+    assert found.state.margin == pytest.approx(WIDEST_MARGIN * 0.5)
+    assert found.iterations <= 15
+    # What is pressed together by 0.1 mm is now by the margin more.
+    pressed = system.contacts[0].lagged_at(found.state)
+    np.testing.assert_allclose(pressed, system.contacts[0].lagged_at(plain), atol=0.12 * np.abs(pressed).max())
+    assert system.touches(plain)[0].overlap > 0.0
+    assert system.touches(found.state)[0].overlap == 0.0
+
+
+def ridges(depth: float) -> System:
+    """A block with a ridge of 28° between two faces, pressed so far on another whose faces meet there too."""
+    low, high = rectangle((1.0, 1.0), (2, 2)), rectangle((1.0, 1.0), (2, 2))
+    points = low.points.copy()
+    points[:, 1] *= 1.0 - 0.25 * np.abs(points[:, 0] - 0.5)
+    low = Mesh(points, low.cells, surfaces=low.surfaces)
+    mesh = merged(low=low, high=shifted_mesh(high, y=1.001))
+    supports = [Clamped("low-y0"), Prescribed("high-y1", (0.0, -depth - 0.001))]
+    return System(mesh, {"body": neo_hookean(1.0, 5.0)}, supports, section=PlaneStrain(), contact=[SelfContact()])
+
+
+@pytest.mark.parametrize("depth", [0.011, 0.03])
+def test_a_ridge_between_the_points_of_contact_does_not_pass_into_what_it_meets(depth, monkeypatch):
+    pytest.importorskip("ipctk")
+    system = ridges(depth)
+    with monkeypatch.context() as blind:
+        blind.setattr(system, "seen_to_overlap", lambda state: False)
+        plain = solve_path(system, [1.0])[0].state
+    assert system.touches(plain)[0].overlap_per_wall < LARGEST_OVERLAP
+    assert system.contacts[0].intersects(plain)
+    found = solve_path(system, [1.0])[0].state
+    assert not system.contacts[0].intersects(found)
+    assert 0.0 < found.margin <= WIDEST_MARGIN
+    assert found.penalty == plain.penalty
+
+
+def angle_section(kind: str, n: int) -> Mesh:
+    """A square of two by two squares less the upper right one; surfaces ``top right``, ends of its arms."""
+    grid = rectangle((2.0, 2.0), (2 * n, 2 * n), kind)
+    middle = grid.points[grid.cells[:, : grid.cell.n_corners]].mean(axis=1)
+    used, cells = np.unique(grid.cells[(middle < 1.0).any(axis=1)], return_inverse=True)
+    points, cells = grid.points[used], cells.reshape(-1, grid.cells.shape[1]).astype(np.int32)
+    skin = boundary_faces(cells)
+    top, right = ((points[skin][:, :, axis] == 2.0).all(axis=1) for axis in (1, 0))
+    return Mesh(points, cells, surfaces={"top": skin[top], "right": skin[right]})
+
+
+@pytest.mark.parametrize(("kind", "n"), [("quad9", 1), ("tri6", 1), ("quad9", 2)])
+def test_a_corner_closes_on_itself(kind, n):
+    # Its two sides share a corner, or even have no other faces; closed they lie on one another.
+    pytest.importorskip("ipctk")
+    mesh = angle_section(kind, n)
+    supports = [Clamped("right"), Prescribed("top", (1.0, -0.6))]
+    material = {"body": neo_hookean(1.0, 5.0)}
+    free = System(mesh, material, supports, section=PlaneStrain())
+    system = System(mesh, material, supports, section=PlaneStrain(), contact=[SelfContact()])
+    fractions = np.linspace(0.1, 1.0, 10)
+    assert system.contacts[0].intersects(solve_path(free, fractions)[-1].state)
+    found = solve_path(system, fractions)
+    for equilibrium in found:
+        assert not system.contacts[0].intersects(equilibrium.state)
+    (touch,) = system.touches(found[-1].state)
+    assert touch.area > 0.1
+    assert touch.overlap_per_wall <= LARGEST_OVERLAP
 
 
 def hairpin(bend: float, wall: float, arm: float, n: int) -> Mesh:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_bodies import half_chamber, merged, shifted_mesh
@@ -41,9 +43,28 @@ def stacked(gap: float, kind: str) -> System:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_self_contact(kind):
+@pytest.mark.parametrize("margin", [0.0, 0.02, 0.06])
+def test_self_contact(kind, margin):
+    # with the widest margin points press too whose gap is positive
     system = stacked(-0.05, kind)
-    check_contact(system.contacts[0], random_state(system, 0.008))
+    check_contact(system.contacts[0], replace(random_state(system, 0.008), margin=margin))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_margin_is_a_gap_that_presses_as_an_overlap_does(kind):
+    # Flat blocks: drawn apart by the margin they press as hard, and nothing overlaps.
+    found = []
+    for gap, margin in ((-0.05, 0.0), (0.01, 0.06)):
+        system = stacked(gap, kind)
+        state = system.consistent(np.zeros_like(system.mesh.points), system.loads_at(0.0), margin=margin)
+        found.append((system.contacts[0].energy(state), system.contacts[0].touch(state), state.lagged[1]))
+    (energy, touch, lagged), (wide_energy, wide, wide_lagged) = found
+    assert energy > 1e-3
+    assert wide_energy == pytest.approx(energy)
+    np.testing.assert_allclose(wide_lagged, lagged, atol=1e-12)
+    assert wide.area == pytest.approx(touch.area)
+    assert touch.overlap == pytest.approx(0.05)
+    assert wide.overlap == 0.0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -134,7 +155,7 @@ def test_closest_points_are_closest(kind):
     shape_of = (2, len(skin.rule))
     partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
     centre, _, radius = balls(points, faces)
-    find_partners(points, faces, centre, radius, skin.rule, start, candidates, np.ones(2), 1.0, partner, at, gap)
+    find_partners(points, faces, centre, radius, skin.rule, start, candidates, np.ones(2), 0.0, 1.0, partner, at, gap)
     assert (partner[1] == 0).all()
     slaves = skin.shape @ points[faces[1]]
     nearest = np.array([np.linalg.norm(slave - surface, axis=1).min() for slave in slaves])

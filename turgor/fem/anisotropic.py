@@ -174,10 +174,9 @@ class SpreadFibres(Mixed):
         _, _, second = self._law(self._strain(F))
         _fill_stiffness(F @ self._H, self._H, self._G, lagged * self._dV, 4.0 * second * self._dV, out)
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the fibre stress at displacement `u`, ``(m, q)``, MPa."""
-        del loads
-        return self.stress(u)
+    def lagged_at(self, state: State) -> Floats:
+        """Return the fibre stress of a state, ``(m, q)``, MPa."""
+        return self.stress(state.u)
 
     def lagged_change(self, state: State, du: Floats) -> Floats:
         """Return the change of the fibre stress along the step `du`, linearised at the state, ``(m, q)``, MPa."""

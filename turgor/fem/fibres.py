@@ -135,10 +135,9 @@ class EmbeddedFibre(Mixed):
         direction, length = self._direction(state.u)
         _fill_stiffness(self._share, direction, self._axial(state.u), lagged / length, out)
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the axial forces at displacement `u`, ``(n_bars,)``, N."""
-        del loads
-        return self.tension(u)
+    def lagged_at(self, state: State) -> Floats:
+        """Return the axial forces of a state, ``(n_bars,)``, N."""
+        return self.tension(state.u)
 
     def lagged_change(self, state: State, du: Floats) -> Floats:
         """Return the change of the axial forces along the step `du`, linearised at the state, ``(n_bars,)``, N."""

@@ -114,10 +114,9 @@ class BondedMembrane(Mixed):
         blocks += np.einsum("fab,ij->faibj", scalar, np.eye(3)).reshape(blocks.shape)
         pack_symmetric(blocks, out)
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the stress resultants at displacement `u`, flat, N/mm."""
-        del loads
-        return self.stress(u).ravel()
+    def lagged_at(self, state: State) -> Floats:
+        """Return the stress resultants of a state, flat, N/mm."""
+        return self.stress(state.u).ravel()
 
     def lagged_change(self, state: State, du: Floats) -> Floats:
         """Return the change of the stress resultants along the step `du`, linearised at the state, flat, N/mm."""

@@ -98,13 +98,12 @@ class Solid(Mixed):
         self._force = np.empty((m, n, self.cell.dimension))
         self._places = kernels.packing(n, self.cell.dimension)
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return what lags at displacement `u`, ``(m, k + 6 q)``.
+    def lagged_at(self, state: State) -> Floats:
+        """Return what lags at a state's displacement, ``(m, k + 6 q)``.
 
         The coefficients of θ, of which the first is the element's ratio of volumes, then the components of S.
         """
-        del loads
-        self._deform(u)
+        self._deform(state.u)
         self._respond()
         if self._now.lagged is None:
             stress = np.empty((*self.dV.shape, 6))
@@ -179,7 +178,7 @@ class Solid(Mixed):
     def mixed_force(self, state: State, lagged: Floats, base: State, kept: Floats, out: Floats) -> None:
         """Add the force out of balance of the mixed problem with the stiffness of `base`, N."""
         self.force_of(state.u, lagged, out)
-        missing = self.lagged_at(state.u, state.loads) - lagged
+        missing = self.lagged_at(state) - lagged
         modes = self._bulk(self._lagged_dilatation(kept)) @ self._lagged_dilatation(missing)[:, :, None]
         pressure = self._at_points(modes[:, :, 0] * self.volume[:, None])
         self._add_forces(base.u, self._lagged_stress(missing), pressure, out)

@@ -30,6 +30,9 @@ class State:
     grips
         For each contact, what its points hold on to by friction (:mod:`turgor.fem.contact.friction`): the one thing
         that remembers how a state was reached. Empty where nothing rubs.
+    margin
+        Surfaces of the body press on each other where the gap between them is below this, mm: zero, or more where they
+        were seen to overlap too much between the points at which contact acts.
     """
 
     u: Floats
@@ -37,6 +40,7 @@ class State:
     loads: Floats
     penalty: float = 1.0
     grips: tuple[Floats, ...] = ()
+    margin: float = 0.0
 
     def with_loads(self, loads: Floats) -> State:
         """Return a copy under other loads."""

@@ -249,9 +249,12 @@ class System:
         field.ravel()[self.pattern.free] = free
         return self.constraints.from_frames(field)
 
-    def consistent(self, u: Floats, loads: Floats, penalty: float = 1.0, grips: tuple[Floats, ...] = ()) -> State:
+    def consistent(
+        self, u: Floats, loads: Floats, penalty: float = 1.0, grips: tuple[Floats, ...] = (), margin: float = 0.0
+    ) -> State:
         """Return the state of displacement `u` in which nothing lags."""
-        return State(u, tuple(term.lagged_at(u, loads) for term in self.terms), loads, penalty, grips)
+        bare = State(u, (), loads, penalty, grips, margin)
+        return replace(bare, lagged=tuple(term.lagged_at(bare) for term in self.terms))
 
     @property
     def rubs(self) -> bool:
@@ -313,8 +316,11 @@ class System:
         return min((contact.longest_step(state, du) for contact in self.contacts), default=1.0)
 
     def seen_to_overlap(self, state: State) -> bool:
-        """Whether an independent look finds surfaces that overlap more than is allowed; no where it is not possible."""
-        return any(contact.intersects(state) is True for contact in self.contacts)
+        """Whether an independent look finds surfaces that overlap more than is allowed; no where it is not possible.
+
+        Surfaces that a barrier keeps apart are not looked at.
+        """
+        return any(contact.intersects(state) is True for contact in self.contacts if not isinstance(contact, Barrier))
 
     def touches(self, state: State) -> list[Touch]:
         """Return how each contact stands."""

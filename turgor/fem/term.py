@@ -41,8 +41,8 @@ class Term(Protocol):
         """Fill the packed upper triangles of the block stiffnesses, ``out (n_blocks, packed)``, N/mm."""
         ...
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the lagged quantities that belong to the displacement `u` under the loads."""
+    def lagged_at(self, state: State) -> Floats:
+        """Return the lagged quantities that belong to the displacement and the loads of a state."""
         ...
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
@@ -61,9 +61,9 @@ class Term(Protocol):
 class Unlagged(ABC):
     """A term of which nothing lags behind the displacement."""
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
+    def lagged_at(self, state: State) -> Floats:
         """Return nothing."""
-        del u, loads
+        del state
         return NOTHING
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
@@ -90,8 +90,8 @@ class Mixed(ABC):
     """
 
     @abstractmethod
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the lagged quantities that belong to the displacement `u` under the loads."""
+    def lagged_at(self, state: State) -> Floats:
+        """Return the lagged quantities that belong to the displacement and the loads of a state."""
 
     @abstractmethod
     def lagged_change(self, state: State, du: Floats) -> Floats:
@@ -103,11 +103,11 @@ class Mixed(ABC):
 
     def force(self, state: State, out: Floats) -> None:
         """Add the force, N."""
-        self.force_of(state.u, self.lagged_at(state.u, state.loads), out)
+        self.force_of(state.u, self.lagged_at(state), out)
 
     def lagged_after(self, state: State, du: Floats, base: State | None = None) -> Floats:
         """Return the lagged quantities after the step `du`, linearised at the state, or with the slopes of `base`."""
-        return self.allowed(self.lagged_at(state.u, state.loads) + self.lagged_change(base or state, du))
+        return self.allowed(self.lagged_at(state) + self.lagged_change(base or state, du))
 
     def allowed(self, lagged: Floats) -> Floats:
         """Return the lagged quantities as far as the term can bear them."""
@@ -120,7 +120,7 @@ class Mixed(ABC):
         """
         del kept
         self.force_of(state.u, lagged, out)
-        self.force_of(base.u, self.lagged_at(state.u, state.loads) - lagged, out)
+        self.force_of(base.u, self.lagged_at(state) - lagged, out)
 
 
 class Loaded(Protocol):

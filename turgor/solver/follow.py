@@ -11,7 +11,9 @@ import numpy as np
 
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
+from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import ArcLength, Quantity, Volume
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
@@ -222,7 +224,11 @@ class _Arc:
             if part > 0.0:
                 aim = here.fraction + part * reach * (here.fraction - before.fraction)
         control = ArcLength(walk.measure(here), here.fraction, self.scale, 1.0, length, walk.quantity.weights)
-        return find_equilibrium(walk.system, walk.linear, guess, aim, walk.options, control=control)
+
+        def find(state: State) -> Equilibrium:
+            return find_equilibrium(walk.system, walk.linear, state, aim, walk.options, control=control)
+
+        return kept_apart(walk.system, find, guess)
 
     def _way(
         self, to: Equilibrium, since: Equilibrium | None = None
@@ -267,7 +273,7 @@ def _walk_from(system: System, quantity: Quantity, options: NewtonOptions, start
     here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
     try:
         if start is None and system.loaded_at_start:
-            here = find_equilibrium(system, linear, here.state, 0.0, options)
+            here = kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, options), here.state)
         return VolumeWalk(system, linear, here, 1.0, options, quantity)
     except NotConvergedError as error:
         raise stopped(system, here, error) from error

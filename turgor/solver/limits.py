@@ -6,6 +6,8 @@ import itertools
 from dataclasses import replace
 
 from turgor.common.log import logger
+from turgor.fem.state import State
+from turgor.solver.apart import kept_apart
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.stops import Facts, at_limit, worst_point
@@ -67,11 +69,15 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
 
 def _at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
     """Return the equilibrium at a load fraction between two states of the walk, the load given."""
+
+    def at_goal(state: State) -> Equilibrium:
+        return find_equilibrium(walk.system, walk.linear, state, goal, walk.options)
+
     for _ in range(REFINEMENTS):
         part = (goal - below.fraction) / (above.fraction - below.fraction)
         guess = above.state.beyond(below.state, part - 1.0)
         try:
-            found = find_equilibrium(walk.system, walk.linear, guess, goal, walk.options)
+            found = kept_apart(walk.system, at_goal, guess)
         except NotConvergedError:
             walk.stand_at(above, below)
             middle = walk.at(0.5 * (walk.measure(below) + walk.measure(above)))

@@ -229,7 +229,7 @@ def _accepted(
     tangent: Tangent | None,
     progress: Progress,
 ) -> Equilibrium:
-    state = system.consistent(state.u, state.loads, state.penalty, state.grips)
+    state = system.consistent(state.u, state.loads, state.penalty, state.grips, state.margin)
     if tangent is None or not tangent.is_near(state):
         tangent = Tangent(system, linear, state, fraction, control, progress)
     return Equilibrium(

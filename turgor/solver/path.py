@@ -11,9 +11,9 @@ import numpy as np
 
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
-from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
 from turgor.solver.events import Event
@@ -44,12 +44,6 @@ MONOTONE = 3.0
 
 LONGEST_REACH = 2.0
 """Lengths of the last step by which the next one is predicted at most."""
-
-STIFFER = 6
-"""How often contact is made stiffer before one equilibrium is given up."""
-
-LOOKS = 2
-"""How often for what is only seen by the independent look, between the points at which contact acts."""
 
 LAGS = 25
 """How often an equilibrium is found again with the forces of friction that it shows, before it is given up."""
@@ -318,19 +312,7 @@ class _Walk:
     def _attempt(self, aim: float, guess: State) -> Equilibrium:
         if self.system.rubs:
             guess = replace(guess, grips=self.system.gripped(self.here.state, dragged=True).grips)
-        found = self._found(aim, guess)
-        for attempt in range(STIFFER):
-            overlap = _overlap(self.system, found.state)
-            seen = 0.0 < overlap <= LARGEST_OVERLAP and attempt < LOOKS and self.system.seen_to_overlap(found.state)
-            if overlap <= LARGEST_OVERLAP and not seen:
-                return found
-            penalty = found.state.penalty * max(2.0, 2.0 * overlap / LARGEST_OVERLAP)
-            log.info("overlap of %.2g of the wall or more: contact made stiffer, factor %.3g", overlap, penalty)
-            self._tally.count(found)
-            found = self._found(aim, replace(found.state, penalty=penalty))
-        raise NotConvergedError(
-            "surfaces overlap too much however stiff their contact is", facts={"overlap_per_wall": overlap}
-        )
+        return kept_apart(self.system, lambda state: self._found(aim, state), guess)
 
     def _found(self, aim: float, guess: State) -> Equilibrium:
         """Return the equilibrium in which friction goes by the normal forces of the equilibrium itself."""
@@ -363,11 +345,6 @@ class _Walk:
         known = (*self.past, here)
         state, _ = predicted(self.system, [e.fraction for e in known], [e.state for e in known], aim)
         return state
-
-
-def _overlap(system: System, state: State) -> float:
-    """Return the largest overlap of any contact over the wall there."""
-    return max((touch.overlap_per_wall for touch in system.touches(state)), default=0.0)
 
 
 def output_fractions(steps: int) -> list[float]:

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.log import logger
+from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.apart import kept_apart
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
@@ -150,7 +152,11 @@ class VolumeWalk:
             reach = (value - places[-1]) / (places[-1] - places[-2])
             fraction += part * reach * (fraction - known[-2].fraction)
         control = self.quantity.fixed(value)
-        return find_equilibrium(self.system, self.linear, guess, fraction, self.options, control=control)
+
+        def find(state: State) -> Equilibrium:
+            return find_equilibrium(self.system, self.linear, state, fraction, self.options, control=control)
+
+        return kept_apart(self.system, find, guess)
 
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between the last two equilibria of the walk, whose compliances differ in sign.

@@ -70,6 +70,7 @@ def to_record(
             "residual": float(equilibrium.residuals[-1]),
             "wall_s": wall_s,
             "contact_penalty": state.penalty,
+            "contact_margin": state.margin,
             "contact_grips": [rows.tolist() for rows in state.grips],
             "bodies_mm": state.u[system.mesh.n_points :].tolist(),
             "load_fraction": equilibrium.fraction,
@@ -169,7 +170,8 @@ def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     grips = tuple(np.array(rows).reshape(-1, WIDTH) for rows in record.solver["contact_grips"])
     bodies = np.array(record.solver.get("bodies_mm", [])).reshape(-1, system.mesh.dimension)
     u = np.vstack([record.displacement, bodies])
-    state = system.consistent(u, loads, record.solver["contact_penalty"], grips)
+    penalty, margin = record.solver["contact_penalty"], record.solver.get("contact_margin", 0.0)
+    state = system.consistent(u, loads, penalty, grips, margin)
     stable = record.solver["stable"]
     # The number of negative pivots is not stored; the solver only asks whether there are any.
     pivots = None if stable is None else int(not stable)

@@ -124,9 +124,9 @@ class Obstacle:
         del u
         return self._nodes[:0] if self._node is None else self._nodes
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
+    def lagged_at(self, state: State) -> Floats:
         """Return the distance of every quadrature point inside the body, else zero, ``(k, q)``, mm."""
-        return np.minimum(self._gaps(u, loads)[0], 0.0)
+        return np.minimum(self._gaps(state.u, state.loads)[0], 0.0)
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
         """Return the distances that the step `du` predicts, ``(k, q)``, mm, never positive."""

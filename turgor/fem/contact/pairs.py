@@ -147,9 +147,9 @@ def closest_point(x, face, point, local, N, D, second, position, tangent, normal
 
 @parallel
 def find_partners(  # type: ignore[no-untyped-def]
-    x, faces, centre, radius, rule, start, candidates, depth, reach, partner, local, gap
+    x, faces, centre, radius, rule, start, candidates, depth, margin, reach, partner, local, gap
 ):
-    """Find for each quadrature point the face that it overlaps, or else the one in front of it.
+    """Find for each quadrature point the face that it overlaps, or is within a margin of, or else the one in front.
 
     Parameters
     ----------
@@ -161,8 +161,9 @@ def find_partners(  # type: ignore[no-untyped-def]
         Local coordinates of the quadrature points ``(q, 2)``.
     start, candidates
         The candidates for face ``f`` are ``candidates[start[f]:start[f + 1]]``.
-    depth, reach
-        How far a point may lie behind a face ``(k,)`` (the smaller of the two counts), and in front of it.
+    depth, margin, reach
+        How far a point may lie behind a face ``(k,)`` (the smaller of the two counts), how far in front of it it counts
+        as overlapping it all the same, and how far in front it is looked for.
     partner, local, gap
         Results: the master ``(k, q)`` (:data:`NOWHERE` if there is none), the closest point ``(k, q, 2)``, the gap
         ``(k, q)``. An overlapped face comes before one in front, the nearer before the farther.
@@ -196,7 +197,7 @@ def find_partners(  # type: ignore[no-untyped-def]
                 if g < -min(depth[f], depth[m]) or g > reach:
                     continue
                 best = gap[f, q]
-                if (g < 0.0 and (best >= 0.0 or g > best)) or (g >= 0.0 and best >= 0.0 and g < best):
+                if (g < margin and (best >= margin or g > best)) or (g >= margin and best >= margin and g < best):
                     partner[f, q] = m
                     gap[f, q] = g
                     local[f, q] = trial

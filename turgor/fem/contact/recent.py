@@ -1,4 +1,4 @@
-"""The last few answers of a search that depends on nothing but the displacement."""
+"""The last few answers of a search that depends on little but the displacement."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ KEPT = 3
 
 
 class Recent(Generic[Answer]):
-    """Calls a function of the displacement, unless it has just been asked about the same.
+    """Calls a function of the displacement and a few numbers, unless it has just been asked about the same.
 
     Parameters
     ----------
     find
-        Returns the answer to a displacement.
+        Returns the answer to a displacement and the numbers.
     """
 
-    def __init__(self, find: Callable[[Floats], Answer]) -> None:
+    def __init__(self, find: Callable[..., Answer]) -> None:
         self._find = find
-        self._known: list[tuple[Floats, Answer]] = []
+        self._known: list[tuple[Floats, tuple[float, ...], Answer]] = []
 
-    def __call__(self, u: Floats) -> Answer:
-        """Return the answer to the displacement `u`."""
-        for at, answer in self._known:
-            if np.array_equal(at, u):
+    def __call__(self, u: Floats, *numbers: float) -> Answer:
+        """Return the answer to the displacement `u` and some numbers."""
+        for at, with_numbers, answer in self._known:
+            if with_numbers == numbers and np.array_equal(at, u):
                 return answer
-        answer = self._find(u)
-        self._known = [(u.copy(), answer), *self._known[: KEPT - 1]]
+        answer = self._find(u, *numbers)
+        self._known = [(u.copy(), numbers, answer), *self._known[: KEPT - 1]]
         return answer

@@ -20,6 +20,9 @@ ASKEW = 0.5
 LEAF = 6
 """Faces in a box that is not divided further."""
 
+CORNER = 0.2
+"""Neighbours whose middles lie so far (in sine) in front of each other at rest make a corner that may close."""
+
 DEEPEST = 128
 """Boxes that may wait to be looked into; a tree that halves has far fewer."""
 
@@ -27,9 +30,9 @@ DEEPEST = 128
 class Search:
     """Finds the faces that may meet.
 
-    Faces that share a corner never meet, nor do the two sides of one wall: faces of one body that lie near and behind
-    one another at rest. Which faces share a box is decided at rest, where they lie and look; the boxes themselves are
-    those of each state.
+    Faces that share a corner meet only where they look at each other at rest, as in the root of a fold; the two sides
+    of one wall never do: faces of one body that lie near and behind one another at rest. Which faces share a box is
+    decided at rest, where they lie and look; the boxes themselves are those of each state.
 
     Parameters
     ----------
@@ -154,6 +157,18 @@ def _one_wall(f, m, centre, normal, radius, wall):  # type: ignore[no-untyped-de
 
 
 @jit
+def _in_a_corner(f, m, centre, normal):  # type: ignore[no-untyped-def]
+    """Whether two faces look at each other across a corner of the body at rest: they may fold upon each other."""
+    square = ahead = back = 0.0
+    for i in range(3):
+        away = centre[m, i] - centre[f, i]
+        square += away * away
+        ahead += away * normal[f, i]
+        back -= away * normal[m, i]
+    return min(ahead, back) > CORNER * np.sqrt(square)
+
+
+@jit
 def _share(first, second):  # type: ignore[no-untyped-def]
     for a in first:
         for b in second:
@@ -203,9 +218,12 @@ def _search(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     square += (centre[f, i] - centre[m, i]) ** 2
                 far = radius[f] + radius[m] + max(reach, min(depth[f], depth[m]))
-                if square > far * far or _share(corners[f], corners[m]):
+                if square > far * far:
                     continue
-                if part[f] == part[m] and _one_wall(f, m, rest_centre, rest_normal, rest_radius, wall):
+                if _share(corners[f], corners[m]):
+                    if not _in_a_corner(f, m, rest_centre, rest_normal):
+                        continue
+                elif part[f] == part[m] and _one_wall(f, m, rest_centre, rest_normal, rest_radius, wall):
                     continue
                 if fill:
                     found[start[f] + count] = m

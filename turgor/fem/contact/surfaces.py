@@ -32,7 +32,8 @@ class Pairs:
     """Points of the skin and the faces they meet.
 
     ``face`` and ``quad`` ``(n,)`` number the quadrature point, ``masters`` ``(n,)`` the face opposite; ``at`` and
-    ``local`` ``(n, 2)`` are the local coordinates on both, ``gap`` ``(n,)`` is negative where they overlap.
+    ``local`` ``(n, 2)`` are the local coordinates on both, ``gap`` ``(n,)`` is negative where they overlap, ``overlap``
+    ``(n,)`` the gap less the margin, negative where they press on each other.
     """
 
     face: Indices
@@ -41,6 +42,7 @@ class Pairs:
     at: Floats
     local: Floats
     gap: Floats
+    overlap: Floats
 
     def where(self, keep: NDArray[np.bool_]) -> Pairs:
         """Return some of the pairs."""
@@ -48,11 +50,13 @@ class Pairs:
 
 
 class SurfaceContact:
-    """½ Σ ε w min(0, g)² over the quadrature points of all faces, w half the reference area of a point, g its gap.
+    """½ Σ ε w min(0, g − m)² over the quadrature points of all faces, w half the reference area of a point, g its gap.
 
-    Every face is slave and master at once, hence the half. What lags are the overlaps: the geometric part of the
-    stiffness takes the force that the last step predicted, F ← ε w min(0, g + ∂g·δu), so that a first
-    touch or a long step does not throw the iteration off.
+    Every face is slave and master at once, hence the half. The margin m, ``State.margin``, is mostly zero. It is one
+    for all points: where it changed with the wall opposite, forces would jump as points pass from face to face.
+
+    What lags are the overlaps: the geometric part of the stiffness takes the force that the last step predicted,
+    F ← ε w min(0, g − m + ∂g·δu), so that a first touch or a long step does not throw the iteration off.
 
     Parameters
     ----------
@@ -76,7 +80,7 @@ class SurfaceContact:
         self.friction = friction
         self._number = number
         self._search = Search(skin, group)
-        self._touching = Recent(self._overlapping)
+        self._recent = Recent(self._overlapping)
 
     @cached_property
     def intersection_check(self) -> IntersectionCheck:
@@ -85,8 +89,8 @@ class SurfaceContact:
 
     def energy(self, state: State) -> float:
         """Return the energy, N mm."""
-        pairs = self._touching(state.u)
-        normal = 0.5 * float(np.sum(self._normal_stiffness(state, pairs) * pairs.gap**2))
+        pairs = self._touching(state)
+        normal = 0.5 * float(np.sum(self._normal_stiffness(state, pairs) * pairs.overlap**2))
         return normal + self._rubbing(state).energy
 
     def merit(self, state: State, lagged: Floats) -> float:
@@ -96,8 +100,8 @@ class SurfaceContact:
 
     def force(self, state: State, out: Floats) -> None:
         """Add the contact forces, N."""
-        pairs = self._touching(state.u)
-        force = self._normal_stiffness(state, pairs) * pairs.gap
+        pairs = self._touching(state)
+        force = self._normal_stiffness(state, pairs) * pairs.overlap
         add_at_nodes(self._nodes(pairs), force[:, None, None] * self._gradients(state.u, pairs), out)
         self._rubbing(state).add_force(out)
 
@@ -106,7 +110,7 @@ class SurfaceContact:
 
     def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
         """Return the nodes of each pair that overlaps and the packed stiffnesses."""
-        skin, pairs = self.skin, self._touching(state.u)
+        skin, pairs = self.skin, self._touching(state)
         nodes = self._nodes(pairs)
         packed = np.empty((len(nodes), packed_size(nodes.shape[1] * skin.dimension)))
         stiffness = self._normal_stiffness(state, pairs)
@@ -129,16 +133,15 @@ class SurfaceContact:
         near = np.hstack([skin.faces[first[keep]], skin.faces[second[keep]]])
         return np.concatenate([near, self._nodes(pairs)])
 
-    def lagged_at(self, u: Floats, loads: Floats) -> Floats:
-        """Return the gap of every quadrature point that overlaps something, else zero, ``(k, q)``, mm."""
-        del loads
-        pairs = self._touching(u)
-        return self._at_points(pairs, pairs.gap)
+    def lagged_at(self, state: State) -> Floats:
+        """Return the gap less the margin of every quadrature point that presses, else zero, ``(k, q)``, mm."""
+        pairs = self._touching(state)
+        return self._at_points(pairs, pairs.overlap)
 
     def lagged_after(self, state: State, du: Floats) -> Floats:
-        """Return the gaps that the step `du` predicts, ``(k, q)``, never positive."""
-        pairs = self._touching(state.u)
-        return self._at_points(pairs, np.minimum(pairs.gap + self._rates(state.u, pairs, du), 0.0))
+        """Return the gaps less the margin that the step `du` predicts, ``(k, q)``, never positive."""
+        pairs = self._touching(state)
+        return self._at_points(pairs, np.minimum(pairs.overlap + self._rates(state.u, pairs, du), 0.0))
 
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much to be seen.
@@ -155,10 +158,10 @@ class SurfaceContact:
         step = 1.0
         if closing.any():
             step = min(1.0, float(((np.maximum(pairs.gap, 0.0) + growth)[closing] / -rate[closing]).min()))
-        before = self.lagged_at(state.u, state.loads)
+        before = self.lagged_at(state)
         for _ in range(TRIALS):
-            after = self._touching(state.u + step * du)
-            grown = before[after.face, after.quad] - after.gap
+            after = self._touching(state.moved(step * du))
+            grown = before[after.face, after.quad] - after.overlap
             excess = (grown / (2.0 * GROWTH_OF_OVERLAP * self._depth(after))).max(initial=0.0)
             if excess <= 1.0:
                 break
@@ -167,13 +170,14 @@ class SurfaceContact:
 
     def touch(self, state: State) -> Touch:
         """Return area and overlaps."""
-        pairs = self._touching(state.u)
+        pairs = self._touching(state)
         wall = np.minimum(self.skin.wall[pairs.face], self.skin.wall[pairs.masters])
         return Touch(
             self.name,
             area=0.5 * float(self.skin.area[pairs.face, pairs.quad].sum()),
             overlap=float((-pairs.gap).max(initial=0.0)),
             overlap_per_wall=float((-pairs.gap / wall).max(initial=0.0)),
+            wall=float(wall.min() if len(wall) else self.skin.wall.min()),
         )
 
     def intersects(self, state: State) -> bool | None:
@@ -188,8 +192,8 @@ class SurfaceContact:
         rows = grips_in(state, self._number)
         if self.friction == 0.0:
             return rows
-        pairs = self._touching(state.u)
-        force = -self._normal_stiffness(state, pairs) * pairs.gap
+        pairs = self._touching(state)
+        force = -self._normal_stiffness(state, pairs) * pairs.overlap
         # The slave's part of the gap's gradient is its normal times shape functions, whose sum is one.
         normal = self._gradients(state.u, pairs)[:, : self.skin.faces.shape[1]].sum(axis=1)
         place = np.column_stack([pairs.masters, pairs.local])
@@ -208,21 +212,26 @@ class SurfaceContact:
         stiffness = self._stiffness_between(state, face, quad, other)
         return rubbing(rows, nodes, weights, apart, self.friction, stiffness, d)
 
-    def _overlapping(self, u: Floats) -> Pairs:
-        pairs = self._pairs(self.skin.space(u), 0.0)
-        return pairs.where(pairs.gap < 0.0)
+    def _touching(self, state: State) -> Pairs:
+        """Return the pairs that press on each other."""
+        return self._recent(state.u, state.margin)
 
-    def _pairs(self, x: Floats, reach: float) -> Pairs:
+    def _overlapping(self, u: Floats, margin: float) -> Pairs:
+        pairs = self._pairs(self.skin.space(u), margin, margin)
+        return pairs.where(pairs.overlap < 0.0)
+
+    def _pairs(self, x: Floats, reach: float, margin: float = 0.0) -> Pairs:
         skin = self.skin
         shape = skin.area.shape
         partner, local, gap = np.empty(shape, np.int32), np.empty((*shape, 2)), np.empty(shape)
         start, candidates = self._search.candidates(x, reach)
         centre, _, radius = balls(x, skin.faces)
         find_partners(
-            x, skin.faces, centre, radius, skin.rule, start, candidates, skin.depth, reach, partner, local, gap
+            x, skin.faces, centre, radius, skin.rule, start, candidates, skin.depth, margin, reach, partner, local, gap
         )
         face, quad = np.nonzero(partner != NOWHERE)
-        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], gap[face, quad])
+        gap = gap[face, quad]
+        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], gap, gap - margin)
 
     def _nodes(self, pairs: Pairs) -> Ints:
         return np.hstack([self.skin.faces[pairs.face], self.skin.faces[pairs.masters]])

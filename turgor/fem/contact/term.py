@@ -17,6 +17,9 @@ Ints = NDArray[np.int32]
 LARGEST_OVERLAP = 0.01
 """An equilibrium counts only where no overlap is more than this part of the wall behind it."""
 
+WIDEST_MARGIN = 2.0 * LARGEST_OVERLAP
+"""Surfaces press on each other at a gap of at most this part of the thinnest wall that does (``State.margin``)."""
+
 GROWTH_OF_OVERLAP = 1.0 / 3.0
 """Part of the depth that the search sees by which an overlap may grow in one step of Newton's method."""
 
@@ -37,6 +40,8 @@ class Touch:
         The largest overlap, mm.
     overlap_per_wall
         The largest overlap over the thickness of the wall there.
+    wall
+        Thickness of the thinnest wall that presses on another part of the body, mm.
     force, torque
         What a rigid body feels, N and N mm, the torque about its reference point; ``None`` for contact of the
         body with itself.
@@ -59,6 +64,7 @@ class Touch:
     gap: float | None = None
     gap_per_wall: float | None = None
     barrier: bool = False
+    wall: float = np.inf
 
 
 class Contact(Term, Protocol):
