@@ -192,12 +192,10 @@ def trends(variants: list[Variant], size: str, own: bool) -> None:
             change(found.touching, base.touching, touching),
             change(found.below, base.below, below),
         ]
-        bending, forces = (
-            cell(found.bending, free, found.limits[0], 1),
-            f"{cell(found.touching, touching, found.limits[1], 3)} | {cell(found.below, below, found.limits[2], 3)}",
-        )
+        values, digits = (found.bending, found.touching, found.below), (1, 3, 3)
+        bending, *forces = map(cell, values, found.reached, found.limits, digits)
         print(
-            f"| {variant.name} | {bending} | {found.contact:.1f} | {forces} | "
+            f"| {variant.name} | {bending} | {found.contact:.1f} | {' | '.join(forces)} | "
             f"{variant.bending}, {variant.force} | {', '.join(ours)} | {100.0 * found.overlap:.2f} | "
             f"{found.crossing} | {time.perf_counter() - begun:.0f} |",
             flush=True,

@@ -89,20 +89,18 @@ class Iterative(StiffnessSolver):
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the step for a right-hand side ``(n,)``, with what it leaves of the volume equations."""
-        problem = None if self._factorised else self._problem(right, self._state)
-        return self._solution(system, right, problem, accuracy)
+        return self._solution(system, right, self._problem(right, self._state), accuracy)
 
     def solution_again(self, system: System, right: Floats, state: State) -> Solution | None:
         """Return the step from a later state, unless more is out of balance there than the last step left."""
-        problem = None if self._factorised else self._problem(right, state)
+        problem = self._problem(right, state)
         if problem is not None and not np.linalg.norm(problem.residual) <= self._left:
             return None
         return self._solution(system, right, problem, FORCING)
 
     def solve(self, right: Floats) -> Floats:
         """Return the displacements ``(n,)``."""
-        problem = None if self._factorised else self._problem(right, self._state)
-        found = None if problem is None else self._found(problem, ACCURATE)
+        found = self._found(self._problem(right, self._state), ACCURATE)
         return self._factors().solve(right) if found is None else self._free_part(found[0])
 
     @property
@@ -111,15 +109,20 @@ class Iterative(StiffnessSolver):
         return self._factors().negative_pivots if self._factorised else None
 
     def _solution(self, system: System, right: Floats, problem: _Problem | None, accuracy: float) -> Solution:
-        found = None if problem is None else self._found(problem, accuracy)
+        found = self._found(problem, accuracy)
         if found is None:
             u = system.nodal(self._factors().solve(right))
             return Solution(u, tuple(np.zeros((len(s.nodes), s.modes.shape[2])) for s in system.solids))
         u, q = found
         return Solution(system.nodal(self._free_part(u)), self._volumes.unmet(u, q))
 
-    def _problem(self, right: Floats, state: State) -> _Problem:
-        """Return the mixed problem for a right-hand side, begun at the pressures that lag at a state."""
+    def _problem(self, right: Floats, state: State) -> _Problem | None:
+        """Return the mixed problem for a right-hand side, begun at the pressures that lag at a state.
+
+        ``None`` where the stiffness is factorised.
+        """
+        if self._factorised:
+            return None
         volumes, n = self._volumes, 3 * len(self._levels.free)
         load = np.zeros(n)
         load[self._levels.free.ravel()] = right[self._number]
@@ -131,12 +134,14 @@ class Iterative(StiffnessSolver):
         x = np.concatenate([np.zeros(n), lagging])
         return _Problem(load, x, np.concatenate([left, -volumes.residual(x[:n], lagging)]))
 
-    def _found(self, problem: _Problem, accuracy: float) -> tuple[Floats, Floats] | None:
-        """Return displacements and pressures in the order of the levels, ``None`` if they are not found.
+    def _found(self, problem: _Problem | None, accuracy: float) -> tuple[Floats, Floats] | None:
+        """Return displacements and pressures in the order of the levels, ``None`` if they are not found or asked for.
 
         The method works with a matrix in single precision; a solution that is to be more accurate than that is
         corrected by what it leaves of the residual in double precision.
         """
+        if problem is None:
+            return None
         n, x, residual = len(problem.load), problem.start, problem.residual
         goal = accuracy * float(np.linalg.norm(residual))
         count = 0

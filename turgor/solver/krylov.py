@@ -101,10 +101,9 @@ def _orthogonalised(basis: Floats, direction: Floats) -> Floats:
     parts = np.zeros(len(basis) + 1)
     before = _length(direction)
     for _ in range(2):
-        part = np.zeros((CHUNKS, len(basis)))
-        _project(basis, direction, part)
-        _add_combined(basis, -part.sum(axis=0), direction)
-        parts[:-1] += part.sum(axis=0)
+        part = _products(basis, direction)
+        _add_combined(basis, -part, direction)
+        parts[:-1] += part
         parts[-1] = _length(direction)
         if parts[-1] > CANCELLED * before:
             break
@@ -113,9 +112,14 @@ def _orthogonalised(basis: Floats, direction: Floats) -> Floats:
 
 
 def _length(vector: Floats) -> float:
-    squares = np.zeros((CHUNKS, 1))
-    _project(vector[None], vector, squares)
-    return float(np.sqrt(squares.sum()))
+    return float(np.sqrt(_products(vector[None], vector)[0]))
+
+
+def _products(basis: Floats, vector: Floats) -> Floats:
+    """Return the products of the rows of `basis` with `vector`."""
+    parts = np.empty((CHUNKS, len(basis)))
+    _project(basis, vector, parts)
+    return np.asarray(parts.sum(axis=0))
 
 
 @parallel
