@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import importlib.metadata
 import importlib.util
 import sys
 from types import ModuleType
 
 from turgor.common.errors import MissingPackageError
+from turgor.common.log import logger
+
+log = logger("common")
 
 OPTIONAL: dict[str, str] = {
     "vtk": "pictures of the deformed body",
@@ -55,6 +59,24 @@ def require(name: str, purpose: str | None = None) -> ModuleType:
         raise MissingPackageError(f"{why} needs the package '{name}': pip install {name}") from error
     except (ImportError, OSError) as error:
         raise MissingPackageError(f"{why} needs a system library: {library_advice(str(error))}") from error
+
+
+def shared_library(package: str, *beginnings: str) -> ctypes.CDLL | None:
+    """Load the library of a Python package whose file name begins in one of these ways; ``None`` where there is none.
+
+    Loaded once, it is also found by others that ask the system for it by name.
+    """
+    try:
+        files = importlib.metadata.files(package) or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    for file in files:
+        if file.name.startswith(beginnings) and not file.name.endswith((".lib", ".a")):
+            try:
+                return ctypes.CDLL(str(file.locate()))
+            except OSError as error:
+                log.warning("%s is installed but does not load: %s", package, error)
+    return None
 
 
 def missing_debian_packages() -> list[str]:

@@ -30,7 +30,7 @@ from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
 from turgor.fem.term import Loaded, Mixed, Term
-from turgor.fem.threads import prefer_light_threads
+from turgor.fem.threads import choose_threads, dense_products_on_one_thread
 from turgor.fem.volumes import VolumeEquations
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh
@@ -68,6 +68,7 @@ class System:
         region without density, the section does not fit the mesh, or the body is free to move as a whole.
     """
 
+    @dense_products_on_one_thread()
     def __init__(
         self,
         mesh: Mesh,
@@ -78,7 +79,7 @@ class System:
         section: Section | None = None,
         contact: Sequence[ContactCase] = (),
     ) -> None:
-        prefer_light_threads()
+        choose_threads()
         check_section(mesh, section)
         self.mesh = mesh
         self.section = section

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import importlib.metadata
 import os
 import weakref
 from abc import abstractmethod
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from turgor.common.errors import SolverError
 from turgor.common.log import logger
-from turgor.common.optional import is_available, require
+from turgor.common.optional import is_available, require, shared_library
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.stiffness import FORCING, Solution, StiffnessSolver
@@ -320,22 +319,12 @@ class SuperLU(LinearSolver):
 @functools.cache
 def _mkl() -> Any | None:
     """Load MKL's runtime library from its Python package, or return ``None`` where there is none."""
-    try:
-        files = importlib.metadata.files("mkl") or []
-    except importlib.metadata.PackageNotFoundError:
-        return None
     # Threads that spin after a factorisation would take the cores from the element kernels.
     os.environ.setdefault("KMP_BLOCKTIME", "0")
-    for file in files:
-        if file.name.startswith(("libmkl_rt.so", "mkl_rt.")) and not file.name.endswith((".lib", ".a")):
-            try:
-                library = ctypes.CDLL(str(file.locate()))
-            except OSError as error:
-                log.warning("MKL is installed but does not load: %s", error)
-                continue
-            library.pardiso.restype = None
-            return library
-    return None
+    library = shared_library("mkl", "libmkl_rt.so", "mkl_rt.")
+    if library is not None:
+        library.pardiso.restype = None
+    return library
 
 
 def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:

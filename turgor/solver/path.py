@@ -13,6 +13,7 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.fem.threads import dense_products_on_one_thread
 from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
@@ -76,6 +77,7 @@ class PathOptions:
     post_snap: bool = False
 
 
+@dense_products_on_one_thread()
 def solve_path(
     system: System,
     fractions: Sequence[float],
