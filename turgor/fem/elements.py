@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem import kernels
 from turgor.fem.section import Axisymmetric, Section, depth
 from turgor.mesh.cells import CELLS, Cell, face_cell, inverses, jacobians
 
@@ -43,7 +44,7 @@ def reference_gradients(nodes: Floats, cell: Cell, section: Section | None) -> t
     places = cell.shape_at_quadrature @ nodes
     inverse, determinant = inverses(jacobians(nodes, cell))
     G = np.zeros((*determinant.shape, 3, cell.n_nodes))
-    G[:, :, : cell.dimension] = inverse.swapaxes(-1, -2) @ cell.gradient_at_quadrature.swapaxes(-1, -2)
+    kernels.turned_gradients(inverse, cell.gradient_at_quadrature, G)
     if isinstance(section, Axisymmetric):
         G[:, :, 2] = cell.shape_at_quadrature / places[:, :, :1]
     return G, determinant * cell.weights * depth(section, places)

@@ -103,6 +103,21 @@ def displacement_gradient(u, G, H):  # type: ignore[no-untyped-def]
 
 
 @parallel
+def turned_gradients(inverse, gradient, G):  # type: ignore[no-untyped-def]
+    """Fill d rows of ``G (m, q, 3, n)`` with gradients ``(q, n, d)`` times inverse Jacobians ``(m, q, d, d)``."""
+    d = inverse.shape[2]
+    for chunk in nb.prange(CHUNKS):
+        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
+            for q in range(G.shape[1]):
+                for i in range(d):
+                    for a in range(G.shape[3]):
+                        total = 0.0
+                        for j in range(d):
+                            total += inverse[e, q, j, i] * gradient[q, a, j]
+                        G[e, q, i, a] = total
+
+
+@parallel
 def deformation(u, cells, G, dV, modes, F, J, dilatation):  # type: ignore[no-untyped-def]
     """Fill ``F (m, q, 3, 3)``, its determinant ``J (m, q)`` and its projection on the pressure modes.
 

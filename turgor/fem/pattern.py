@@ -82,19 +82,23 @@ class SparsePattern:
     ) -> None:
         self.free = free
         self.n_free = int(free.sum())
-        node_start, node_column = _node_pattern(n_nodes, [*groups, *couplings])
-        dof_start = _dof_row_starts(node_start, dimension)
-        place = np.empty(dof_start[-1], np.int32)
-        column = np.empty(dof_start[-1], np.int32)
-        self.row_start = np.zeros(self.n_free + 1, np.int32)
-        number = np.cumsum(free, dtype=np.int32) - np.int32(1)
-        shape = (node_start, node_column, dof_start, dimension)
-        self.n_stored = int(_number(*shape, free, number, place, self.row_start, column))
-        self.column = column[: self.n_stored]
-        self._places = (*shape, place)
+        self._dimension = dimension
+        self._node_start, self._node_column = _node_pattern(n_nodes, [*groups, *couplings])
         sizes = [len(group) * packed_size(group.shape[1] * dimension) for group in groups]
         self.packed_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         self._groups = groups
+
+    @property
+    def row_start(self) -> Ints:  # noqa: D102
+        return self._rows[2]
+
+    @property
+    def column(self) -> Ints:  # noqa: D102
+        return self._rows[3]
+
+    @property
+    def n_stored(self) -> int:  # noqa: D102
+        return len(self.column)
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
@@ -103,14 +107,13 @@ class SparsePattern:
 
     def covers(self, nodes: Ints) -> bool:
         """Whether all nodes of each block ``(n_blocks, nodes_per_block)`` are coupled in this pattern."""
-        node_start, node_column, *_ = self._places
-        return bool(_all_coupled(nodes, node_start, node_column))
+        return bool(_all_coupled(nodes, self._node_start, self._node_column))
 
     def add_blocks(self, nodes: Ints, packed: Floats, out: Floats) -> None:
         """Add packed blocks ``(n_blocks, packed)`` that the pattern covers to the stored values `out`."""
-        node_start, node_column, dof_start, dimension, place = self._places
-        pairs = _find_pairs(nodes, node_start, node_column)
-        _add(nodes, pairs, packed, node_start, dof_start, dimension, place, out)
+        pairs = _find_pairs(nodes, self._node_start, self._node_column)
+        dof_start, place, *_ = self._rows
+        _add(nodes, pairs, packed, self._node_start, dof_start, self._dimension, place, out)
 
     def graph(self) -> sp.csr_matrix:
         """Return which nodes are coupled, both ways, ``(n_nodes, n_nodes)``.
@@ -118,22 +121,35 @@ class SparsePattern:
         Its values are one more than the places of the blocks among those on and above the diagonal, which
         :meth:`sum_into_layout` goes through; negative below it.
         """
-        node_start, node_column, *_ = self._places
-        names = np.arange(1, len(node_column) + 1)
-        n = len(node_start) - 1
-        upper = sp.csr_matrix((names, node_column, node_start), shape=(n, n))
+        names = np.arange(1, len(self._node_column) + 1)
+        n = len(self._node_start) - 1
+        upper = sp.csr_matrix((names, self._node_column, self._node_start), shape=(n, n))
         return sp.csr_matrix(upper - sp.triu(upper, 1).T)
 
     def sum_into_layout(self, packed: Floats, layout: BlockLayout, out: NDArray[np.floating]) -> None:
         """Add up the `packed` block entries of a system in space into blocks, fixed components being identity."""
-        node_start, node_column, *_ = self._places
         places = (layout.place, layout.width, layout.turned)
-        _sum_into_layout(packed, *self._pairs, *places, node_start, node_column, self.free.reshape(-1, 3), out)
+        nodes = (self._node_start, self._node_column, self.free.reshape(-1, 3))
+        _sum_into_layout(packed, *self._pairs, *places, *nodes, out)
+
+    @functools.cached_property
+    def _rows(self) -> tuple[Longs, Ints, Ints, Ints]:
+        """The compressed rows, and before them where those of all degrees of freedom would begin and what is stored.
+
+        Only a factorisation asks for them.
+        """
+        dof_start = _dof_row_starts(self._node_start, self._dimension)
+        place, column = np.empty(dof_start[-1], np.int32), np.empty(dof_start[-1], np.int32)
+        row_start = np.zeros(self.n_free + 1, np.int32)
+        number = np.cumsum(self.free, dtype=np.int32) - np.int32(1)
+        shape = (self._node_start, self._node_column, dof_start, self._dimension)
+        n_stored = _number(*shape, self.free, number, place, row_start, column)
+        return dof_start, place, row_start, column[:n_stored]
 
     @functools.cached_property
     def _pairs(self) -> tuple[Longs, Ints, Ints]:
         """For each pair of coupled nodes, where the packed entries that add up to it begin, and how they follow."""
-        node_start, node_column, _, dimension, _ = self._places
+        node_start, node_column = self._node_start, self._node_column
         pairs = [_find_pairs(group, node_start, node_column) for group in self._groups]
         start = np.zeros(len(node_column) + 1, np.int64)
         for found in pairs:
@@ -142,8 +158,8 @@ class SparsePattern:
         at, source, code = start[:-1].copy(), np.empty(start[-1], np.int32), np.empty(start[-1], np.int32)
         begin = 0
         for group, found in zip(self._groups, pairs, strict=True):
-            _list_sources(group, found, begin, dimension, at, source, code)
-            begin += len(group) * packed_size(group.shape[1] * dimension)
+            _list_sources(group, found, begin, self._dimension, at, source, code)
+            begin += len(group) * packed_size(group.shape[1] * self._dimension)
         return start, source, code
 
     @functools.cached_property
@@ -152,7 +168,9 @@ class SparsePattern:
 
         They are sought by pairs of nodes, of which there are nine times fewer.
         """
-        return _spread(*self._pairs, *self._places, self.n_stored)  # type: ignore[no-any-return]
+        dof_start, place, *_ = self._rows
+        shape = (self._node_start, self._node_column, dof_start, self._dimension)
+        return _spread(*self._pairs, *shape, place, self.n_stored)  # type: ignore[no-any-return]
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:

@@ -24,10 +24,6 @@ At 36 000 both cost the same, and the factorisation saves iterations where the f
 """
 
 
-SMALL = 30_000
-"""Unknowns up to which one thread factorises it: two are hardly faster, and wait for each other on a busy machine."""
-
-
 class CoarseSolver(Protocol):
     """Solves with a symmetric matrix of one pattern, or nearly."""
 
@@ -48,9 +44,7 @@ def make_coarse_solver(row_start: Ints, column: Ints, points: Floats, free: NDAr
     if n > FACTORISED:
         log.warning("the coarse level has %d unknowns; with the package 'pyamg' it need not be factorised", n)
     kind = solver_in_use()
-    if kind is Pardiso:
-        return Pardiso(row_start, column, single=True, threads=1 if n <= SMALL else None)
-    return kind(row_start, column)
+    return Pardiso(row_start, column, single=True) if kind is Pardiso else kind(row_start, column)
 
 
 class SmoothedAggregation:

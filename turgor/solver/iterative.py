@@ -15,22 +15,20 @@ order of μ.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from turgor.common.log import logger
 from turgor.fem.pattern import SparsePattern
 from turgor.fem.state import State
 from turgor.fem.system import System
-from turgor.fem.volumes import VolumeEquations
 from turgor.solver.krylov import gmres
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.multigrid import TwoLevels
+from turgor.solver.pressures import Pressures
 from turgor.solver.stiffness import ACCURATE, FORCING, Solution, StiffnessSolver
 
 Floats = NDArray[np.float64]
@@ -66,9 +64,11 @@ class Iterative(StiffnessSolver):
     def __init__(self, system: System) -> None:
         self.iterations: list[int] = []
         self._levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
+        fine = self._levels.fine
+        self._pressures = Pressures([solid.nodes for solid in system.solids], fine.rank, self._levels.free)
         self._system = system
         # Of each free component, in the order of the rows, its number among the unknowns.
-        number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[self._levels.fine.order] - 1
+        number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[fine.order] - 1
         self._number: Ints = number[self._levels.free]
         self._direct: LinearSolver | None = None
         self._factorised = False
@@ -85,7 +85,7 @@ class Iterative(StiffnessSolver):
             return
         equations = system.split_stiffness(state, AUGMENTATION, self._levels.fine.layout, self._levels.fine.values)
         self._levels.update()
-        self._volumes = _Volumes(self._levels, equations)
+        self._pressures.take(equations)
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the step for a right-hand side ``(n,)``, with what it leaves of the volume equations."""
@@ -114,7 +114,7 @@ class Iterative(StiffnessSolver):
             u = system.nodal(self._factors().solve(right))
             return Solution(u, tuple(np.zeros((len(s.nodes), s.modes.shape[2])) for s in system.solids))
         u, q = found
-        return Solution(system.nodal(self._free_part(u)), self._volumes.unmet(u, q))
+        return Solution(system.nodal(self._free_part(u)), self._pressures.unmet(u, q))
 
     def _problem(self, right: Floats, state: State) -> _Problem | None:
         """Return the mixed problem for a right-hand side, begun at the pressures that lag at a state.
@@ -123,16 +123,16 @@ class Iterative(StiffnessSolver):
         """
         if self._factorised:
             return None
-        volumes, n = self._volumes, 3 * len(self._levels.free)
+        pressures, n = self._pressures, 3 * len(self._levels.free)
         load = np.zeros(n)
         load[self._levels.free.ravel()] = right[self._number]
         # At the out-of-balance force, what the lagging pressures leave of it is much less than all.
-        lagging = volumes.of_lag(self._system.dilatation_lag(state))
-        left = load - volumes.forces(lagging)
+        lagging = pressures.of_lag(self._system.dilatation_lag(state))
+        left = load - pressures.forces(lagging)
         if np.linalg.norm(left) > np.linalg.norm(load):
             lagging, left = np.zeros_like(lagging), load
         x = np.concatenate([np.zeros(n), lagging])
-        return _Problem(load, x, np.concatenate([left, -volumes.residual(x[:n], lagging)]))
+        return _Problem(load, x, np.concatenate([left, -pressures.residual(x[:n], lagging)]))
 
     def _found(self, problem: _Problem | None, accuracy: float) -> tuple[Floats, Floats] | None:
         """Return displacements and pressures in the order of the levels, ``None`` if they are not found or asked for.
@@ -174,16 +174,16 @@ class Iterative(StiffnessSolver):
         order, free = self._levels.fine.order, self._levels.free
         nodal = np.empty((len(order), 3))
         nodal[order] = x[:n].reshape(-1, 3)
-        forces = (self._system.stiffness_times(nodal)[order] * free).ravel() + self._volumes.forces(x[n:])
-        return np.concatenate([load - forces, -self._volumes.residual(x[:n], x[n:])])
+        forces = (self._system.stiffness_times(nodal)[order] * free).ravel() + self._pressures.forces(x[n:])
+        return np.concatenate([load - forces, -self._pressures.residual(x[:n], x[n:])])
 
     def _precondition(self, x: Floats) -> tuple[Floats, Floats]:
         """Return what the preconditioner makes of a residual, and the product of the matrix with it."""
         n = 3 * len(self._levels.free)
-        q = self._volumes.pressures(x[n:])
-        forces = self._volumes.forces(q)
+        q = self._pressures.pressures(x[n:])
+        forces = self._pressures.forces(q)
         u, product = self._levels.apply(x[:n] - forces)
-        return np.concatenate([u, q]), np.concatenate([product + forces, self._volumes.residual(u, q)])
+        return np.concatenate([u, q]), np.concatenate([product + forces, self._pressures.residual(u, q)])
 
     def _free_part(self, u: Floats) -> Floats:
         part = np.empty(self._system.n_dofs)
@@ -208,81 +208,3 @@ class _Problem:
     load: Floats
     start: Floats
     residual: Floats
-
-
-class _Volumes:
-    """The volume equations of all solids, scaled so that S is the identity, and their rows to forces."""
-
-    def __init__(self, levels: TwoLevels, equations: list[VolumeEquations]) -> None:
-        self._equations = equations
-        self._factor, self._compliance, gradients, weight = [], [], [], []
-        for eq in equations:
-            m, k = eq.gradient.shape[:2]
-            compliance = _inverses(eq.bulk)
-            schur = compliance + (eq.volume / eq.modulus)[:, None, None] * np.eye(k)
-            factor = np.asarray(np.linalg.cholesky(schur), float)
-            inverse = _inverses(factor)
-            self._factor.append(factor)
-            self._compliance.append(inverse @ compliance @ inverse.swapaxes(1, 2))
-            free = levels.free[levels.fine.rank[eq.nodes]].transpose(0, 2, 1).reshape(m, 1, -1)
-            gradients.append(inverse @ (eq.gradient.reshape(m, k, -1) * free))
-            weight.append(np.repeat(np.sqrt(eq.modulus * np.cbrt(eq.volume)), k))
-        self._B = _gradient_matrix(levels, equations, gradients)
-        self._Bt = self._B.T.tocsr()
-        self._weight = np.concatenate(weight)
-        self._shapes = [eq.gradient.shape[:2] for eq in equations]
-        self._cuts = np.cumsum([m * k for m, k in self._shapes])[:-1]
-
-    def of_lag(self, lags: Sequence[Floats]) -> Floats:
-        """Return the pressures that belong to dilatations ``(m, k)`` of each solid."""
-        parts = [
-            (factor.swapaxes(1, 2) @ (eq.bulk @ (eq.volume[:, None] * lag)[:, :, None])).ravel()
-            for eq, factor, lag in zip(self._equations, self._factor, lags, strict=True)
-        ]
-        return np.concatenate(parts)
-
-    def forces(self, q: Floats) -> Floats:
-        """Return Bᵀ q."""
-        return np.asarray(self._Bt @ q)
-
-    def residual(self, u: Floats, q: Floats) -> Floats:
-        """Return B u − E⁻¹ q as forces."""
-        return np.asarray(self._weight * self._gaps(u, q))
-
-    def pressures(self, residual: Floats) -> Floats:
-        """Return −S⁻¹ of a residual."""
-        return np.asarray(-residual / self._weight)
-
-    def unmet(self, u: Floats, q: Floats) -> tuple[Floats, ...]:
-        """Return for each solid the dilatations that `u` has and `q` does not, ``(m, k)``."""
-        parts = np.split(self._gaps(u, q), self._cuts)
-        return tuple(
-            (factor @ part.reshape(*shape, 1))[:, :, 0] / eq.volume[:, None]
-            for eq, factor, shape, part in zip(self._equations, self._factor, self._shapes, parts, strict=True)
-        )
-
-    def _gaps(self, u: Floats, q: Floats) -> Floats:
-        parts = np.split(q, self._cuts)
-        products = [
-            (c @ part.reshape(*shape, 1)).ravel()
-            for c, shape, part in zip(self._compliance, self._shapes, parts, strict=True)
-        ]
-        return np.asarray(self._B @ u - np.concatenate(products))
-
-
-def _inverses(matrices: Floats) -> Floats:
-    """Return the inverses of ``(m, k, k)``; most often k is 1, for which LAPACK takes far longer."""
-    return np.asarray(1.0 / matrices if matrices.shape[1] == 1 else np.linalg.inv(matrices), float)
-
-
-def _gradient_matrix(levels: TwoLevels, equations: list[VolumeEquations], gradients: list[Floats]) -> sp.csr_matrix:
-    data, column, width = [], [], []
-    for eq, gradient in zip(equations, gradients, strict=True):
-        m, k = gradient.shape[:2]
-        places = 3 * levels.fine.rank[eq.nodes][:, None, :] + np.arange(3, dtype=np.int32)[:, None]
-        column.append(np.broadcast_to(places.reshape(m, 1, -1), gradient.shape).ravel())
-        data.append(gradient.ravel())
-        width.append(np.full(m * k, gradient.shape[2]))
-    start = np.concatenate([[0], np.cumsum(np.concatenate(width))])
-    shape = (len(start) - 1, 3 * len(levels.free))
-    return sp.csr_matrix((np.concatenate(data), np.concatenate(column), start), shape=shape)

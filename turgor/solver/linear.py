@@ -125,18 +125,15 @@ class Pardiso(LinearSolver):
         As for :class:`LinearSolver`.
     single
         Whether factors and solutions are in single precision, in half of the memory.
-    threads
-        Threads to use; ``None`` for as many as MKL is told to.
     """
 
     name = "MKL PARDISO"
 
-    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False, threads: int | None = None) -> None:
+    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False) -> None:
         library = _mkl()
         assert library is not None
         self._pardiso = library.pardiso
-        self._set_threads = library.MKL_Set_Num_Threads_Local
-        self._threads = threads
+        self._threads = int(library.MKL_Get_Max_Threads())
         self._precision: type[np.floating] = np.float32 if single else np.float64
         self._release: Callable[[], object] = _nothing
         super().__init__(row_start, column)
@@ -156,6 +153,7 @@ class Pardiso(LinearSolver):
         control[1] = 3 if len(column) > BY_DEGREE else 0  # nested dissection in parallel, or minimum degree
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
         control[20] = 1  # Bunch–Kaufman pivots
+        control[23] = self._threads > 1  # in two levels, whose threads hardly wait for each other
         control[27] = self._precision is np.float32  # single precision
         control[34] = 1  # indices from zero
         self._control = control
@@ -193,7 +191,6 @@ class Pardiso(LinearSolver):
     def _call(
         self, phase: int, right: NDArray[np.floating] | None = None, solution: NDArray[np.floating] | None = None
     ) -> None:
-        others = self._set_threads(self._threads) if self._threads else 0
         error = _pardiso_call(
             self._pardiso,
             phase,
@@ -202,8 +199,6 @@ class Pardiso(LinearSolver):
             (self._values, self.row_start, self.column),
             (_EMPTY if right is None else right, _EMPTY if solution is None else solution),
         )
-        if self._threads:
-            self._set_threads(others)
         if error == -2:
             raise SolverError("not enough memory for the factorisation", advice="A coarser mesh needs less")
         if error == -4:
