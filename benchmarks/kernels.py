@@ -124,13 +124,14 @@ def of_the_matrix(system: System) -> list[Kernel]:
     matrix.update()
     packed = system._packed
     right = np.random.default_rng(0).standard_normal(3 * len(matrix.order))
-    lists, pairs = sum(a.nbytes for a in pattern._sources), sum(a.nbytes for a in pattern._pairs)
+    pairs = sum(a.nbytes for a in pattern._pairs)
     places = sum(a.nbytes for a in vars(matrix.layout).values())
+    rows = sum(a.nbytes for a in pattern._rows[:2])
     return [
         Kernel(
             "assembly, single entries",
             lambda: pattern.sum_blocks(packed, values),
-            size_bytes=packed.nbytes + lists + values.nbytes,
+            size_bytes=packed.nbytes + pairs + rows + values.nbytes,
         ),
         Kernel(
             "assembly, blocks",

@@ -2,9 +2,9 @@
 
 Each term couples the degrees of freedom of its blocks of nodes (the ten nodes of a tetrahedron, the six
 of a face) and hands over dense symmetric block matrices as packed upper triangles. The pattern is the upper
-triangle, in compressed rows, of the matrix over the free degrees of freedom; which packed entries add up to
-which stored value is sorted out here once, so that an assembly is one pass over a list: without
-locks, in parallel over rows, and in the same order (hence to the same bits) every time.
+triangle, in compressed rows, of the matrix over the free degrees of freedom; which parts of which blocks add up to
+which pair of nodes is sorted out here once, so that an assembly is one pass over a list: without
+locks, in parallel over nodes, and in the same order (hence to the same bits) every time.
 """
 
 from __future__ import annotations
@@ -102,8 +102,10 @@ class SparsePattern:
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
-        out[:] = 0.0
-        _gather(packed, *self._sources, out)
+        dof_start, place, *_ = self._rows
+        _sum_into_rows(
+            packed, *self._pairs, self._node_start, self._node_column, dof_start, place, self._dimension, out
+        )
 
     def covers(self, nodes: Ints) -> bool:
         """Whether all nodes of each block ``(n_blocks, nodes_per_block)`` are coupled in this pattern."""
@@ -161,16 +163,6 @@ class SparsePattern:
             _list_sources(group, found, begin, self._dimension, at, source, code)
             begin += len(group) * packed_size(group.shape[1] * self._dimension)
         return start, source, code
-
-    @functools.cached_property
-    def _sources(self) -> tuple[Longs, Ints]:
-        """For each stored value, where the packed entries that add up to it begin, and the entries.
-
-        They are sought by pairs of nodes, of which there are nine times fewer.
-        """
-        dof_start, place, *_ = self._rows
-        shape = (self._node_start, self._node_column, dof_start, self._dimension)
-        return _spread(*self._pairs, *shape, place, self.n_stored)  # type: ignore[no-any-return]
 
 
 def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
@@ -283,33 +275,6 @@ def _all_coupled(group, node_start, node_column):  # type: ignore[no-untyped-def
 
 
 @nb.njit(cache=True)
-def _spread(start, source, code, node_start, node_column, dof_start, d, place, n_stored):  # type: ignore[no-untyped-def]
-    """Return for each stored entry the packed ones that add up to it, in the order of the entries."""
-    begin = np.zeros(n_stored + 1, np.int64)
-    single = np.empty(d * d * len(source), np.int32)
-    at = 0
-    for a in range(len(node_start) - 1):
-        for i in range(d):
-            for m in range(node_start[a], node_start[a + 1]):
-                row = dof_start[a * d + i] + d * (m - node_start[a]) - i
-                for k in range(i if m == node_start[a] else 0, d):
-                    entry = place[row + k]
-                    if entry < 0:
-                        continue
-                    for n in range(start[m], start[m + 1]):
-                        how, width = code[n] & 3, code[n] >> 2
-                        r, c = (k, i) if how == TRANSPOSED else (i, k)
-                        # Each row of a packed triangle begins one entry earlier than the one before.
-                        single[at] = source[n] + r * width - r * (r + 1) // 2 + c
-                        at += 1
-                        if how == FOLDED:
-                            single[at] = source[n] + c * width - c * (c + 1) // 2 + r
-                            at += 1
-                    begin[entry + 1] = at
-    return begin, single[:at].copy()
-
-
-@nb.njit(cache=True)
 def _add(group, found, packed, node_start, dof_start, d, place, out):  # type: ignore[no-untyped-def]
     """Add packed blocks to the stored values, entry by entry: for few of them no list is worth while."""
     n = group.shape[1]
@@ -332,14 +297,20 @@ def _add(group, found, packed, node_start, dof_start, d, place, out):  # type: i
 
 
 @nb.njit(cache=True, parallel=True)
-def _gather(packed, start, source, out):  # type: ignore[no-untyped-def]
+def _sum_into_rows(packed, start, source, code, node_start, node_column, dof_start, place, d, out):  # type: ignore[no-untyped-def]
     n_chunks = 64
+    n = len(node_start) - 1
     for chunk in nb.prange(n_chunks):
-        for k in range(chunk * len(out) // n_chunks, (chunk + 1) * len(out) // n_chunks):
-            total = 0.0
-            for m in range(start[k], start[k + 1]):
-                total += packed[source[m]]
-            out[k] += total
+        block = np.empty((3, 3))
+        for a in range(chunk * n // n_chunks, (chunk + 1) * n // n_chunks):
+            for m in range(node_start[a], node_start[a + 1]):
+                _sum_pair(packed, start[m], start[m + 1], source, code, d, block)
+                for i in range(d):
+                    row = dof_start[a * d + i] + d * (m - node_start[a]) - i
+                    for k in range(i if node_column[m] == a else 0, d):
+                        entry = place[row + k]
+                        if entry >= 0:
+                            out[entry] = block[i, k]
 
 
 @nb.njit(cache=True, parallel=True)
@@ -352,7 +323,7 @@ def _sum_into_layout(  # type: ignore[no-untyped-def]
         block = np.empty((3, 3))
         for a in range(chunk * n // n_chunks, (chunk + 1) * n // n_chunks):
             for m in range(node_start[a], node_start[a + 1]):
-                _sum_pair(packed, start[m], start[m + 1], source, code, block)
+                _sum_pair(packed, start[m], start[m + 1], source, code, 3, block)
                 b = node_column[m]
                 for i in range(3):
                     for k in range(3):
@@ -365,8 +336,8 @@ def _sum_into_layout(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, inline="always")
-def _sum_pair(packed, first, last, source, code, block):  # type: ignore[no-untyped-def]
-    """Add up the packed entries of one pair of nodes in space into its `block`.
+def _sum_pair(packed, first, last, source, code, d, block):  # type: ignore[no-untyped-def]
+    """Add up the packed entries of one pair of nodes into its `block`, of which d rows and columns count.
 
     Written out and with indices that cannot count from the end: loops over the nine take far longer.
     """
@@ -379,34 +350,37 @@ def _sum_pair(packed, first, last, source, code, block):  # type: ignore[no-unty
         if how == UPPER:
             s00 += packed[r0]
             s01 += packed[r0 + one]
-            s02 += packed[r0 + two]
             s11 += packed[r1 + one]
-            s12 += packed[r1 + two]
-            s22 += packed[r2 + two]
             s10 += packed[r0 + one]
-            s20 += packed[r0 + two]
-            s21 += packed[r1 + two]
+            if d == 3:
+                s02 += packed[r0 + two]
+                s12 += packed[r1 + two]
+                s22 += packed[r2 + two]
+                s20 += packed[r0 + two]
+                s21 += packed[r1 + two]
             continue
         if how != TRANSPOSED:
             s00 += packed[r0]
             s01 += packed[r0 + one]
-            s02 += packed[r0 + two]
             s10 += packed[r1]
             s11 += packed[r1 + one]
-            s12 += packed[r1 + two]
-            s20 += packed[r2]
-            s21 += packed[r2 + one]
-            s22 += packed[r2 + two]
+            if d == 3:
+                s02 += packed[r0 + two]
+                s12 += packed[r1 + two]
+                s20 += packed[r2]
+                s21 += packed[r2 + one]
+                s22 += packed[r2 + two]
         if how != AS_IT_IS:
             s00 += packed[r0]
             s10 += packed[r0 + one]
-            s20 += packed[r0 + two]
             s01 += packed[r1]
             s11 += packed[r1 + one]
-            s21 += packed[r1 + two]
-            s02 += packed[r2]
-            s12 += packed[r2 + one]
-            s22 += packed[r2 + two]
+            if d == 3:
+                s20 += packed[r0 + two]
+                s21 += packed[r1 + two]
+                s02 += packed[r2]
+                s12 += packed[r2 + one]
+                s22 += packed[r2 + two]
     block[0, 0], block[0, 1], block[0, 2] = s00, s01, s02
     block[1, 0], block[1, 1], block[1, 2] = s10, s11, s12
     block[2, 0], block[2, 1], block[2, 2] = s20, s21, s22
