@@ -1,4 +1,4 @@
-"""Threads of the kernels, and of OpenBLAS beside them."""
+"""Threads of the kernels."""
 
 from __future__ import annotations
 
@@ -6,11 +6,7 @@ import os
 import subprocess
 import sys
 
-import pytest
-from threadpoolctl import ThreadpoolController
-
 from turgor.common.optional import is_available, shared_library
-from turgor.fem.threads import dense_products_on_one_thread
 
 LAYER = """
 import numba
@@ -41,17 +37,3 @@ def test_kernels_run_on_tbb_where_it_is_installed() -> None:
 
 def test_the_user_may_choose_other_threads() -> None:
     assert layer(NUMBA_THREADING_LAYER="workqueue") == "workqueue"
-
-
-def test_openblas_works_on_one_thread_and_then_on_as_many_as_before() -> None:
-    openblas = ThreadpoolController().select(internal_api="openblas")
-    if not openblas.info():
-        pytest.skip("NumPy and SciPy have another BLAS here")
-
-    def threads() -> list[int]:
-        return [pool["num_threads"] for pool in openblas.info()]
-
-    before = threads()
-    with dense_products_on_one_thread():
-        assert threads() == [1] * len(before)
-    assert threads() == before

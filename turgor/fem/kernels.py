@@ -273,25 +273,31 @@ def elasticity(tau, tangent, pressure_J, weight, A):  # type: ignore[no-untyped-
 
 
 @inlined
-def add_products(A, g, half, K):  # type: ignore[no-untyped-def]
+def add_products(A, g, half, d, n, K):  # type: ignore[no-untyped-def]
     """Add ``g · A · g`` to the blocks on and above the diagonal of a stiffness matrix, stored as ``K (d, n, d n)``.
 
     ``K[i, a]`` is the row of component i of node a from the diagonal block on: ``K[i, a, (k - i) n + b]`` couples it to
-    component k of node b. The columns of one component lie side by side, so that the loop over them vectorises.
+    component k of node b. The columns of one component lie side by side, so that the loop over them vectorises; two
+    rows at a time share what it loads.
     """
-    d, n_nodes = K.shape[0], K.shape[1]
     for i in range(d):
+        width = (d - i) * n
         for s in range(3):
             for k in range(d - i):
                 a0, a1, a2 = A[i, s, i + k, 0], A[i, s, i + k, 1], A[i, s, i + k, 2]
-                part = half[s, k * n_nodes : (k + 1) * n_nodes]
-                for a in range(n_nodes):
-                    part[a] = a0 * g[0, a] + a1 * g[1, a] + a2 * g[2, a]
-        for a in range(n_nodes):
+                for a in range(n):
+                    half[s, k * n + a] = a0 * g[0, a] + a1 * g[1, a] + a2 * g[2, a]
+        for a in range(0, n - 1, 2):
             g0, g1, g2 = g[0, a], g[1, a], g[2, a]
-            row = K[i, a]
-            for c in range((d - i) * n_nodes):
-                row[c] += g0 * half[0, c] + g1 * half[1, c] + g2 * half[2, c]
+            h0, h1, h2 = g[0, a + 1], g[1, a + 1], g[2, a + 1]
+            for c in range(width):
+                x, y, z = half[0, c], half[1, c], half[2, c]
+                K[i, a, c] += g0 * x + g1 * y + g2 * z
+                K[i, a + 1, c] += h0 * x + h1 * y + h2 * z
+        if n % 2:
+            g0, g1, g2 = g[0, n - 1], g[1, n - 1], g[2, n - 1]
+            for c in range(width):
+                K[i, n - 1, c] += g0 * half[0, c] + g1 * half[1, c] + g2 * half[2, c]
 
 
 @inlined
@@ -309,19 +315,23 @@ def add_volume_gradients(weight, g, modes, b):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def add_condensed(bulk, b, K):  # type: ignore[no-untyped-def]
+def add_condensed(bulk, b, d, n, K):  # type: ignore[no-untyped-def]
     """Add ``Σ_kl bulk_kl b_k b_lᵀ`` to `K`, stored as in :func:`add_products`; `b` is ``(k, d n)``."""
-    n_nodes = K.shape[1]
-    for i in range(K.shape[0]):
+    for i in range(d):
         for m in range(len(bulk)):
-            right = b[m, i * n_nodes :]
-            for a in range(n_nodes):
+            right = b[m, i * n :]
+            for a in range(n):
                 scale = 0.0
                 for k in range(len(bulk)):
-                    scale += bulk[k, m] * b[k, i * n_nodes + a]
+                    scale += bulk[k, m] * b[k, i * n + a]
                 row = K[i, a]
                 for c in range(len(right)):
                     row[c] += scale * right[c]
+
+
+def counted(n: int) -> tuple[int, ...]:
+    """Return a tuple of `n` numbers, whose length a compiled function knows when it is compiled."""
+    return (0,) * n
 
 
 def packing(n_nodes: int, d: int) -> NDArray[np.uintp]:
@@ -338,30 +348,33 @@ def packing(n_nodes: int, d: int) -> NDArray[np.uintp]:
 
 
 @parallel
-def element_stiffness(F, G, dV, tau, tangent, pressure, modes, bulk, d, places, packed):  # type: ignore[no-untyped-def]
+def element_stiffness(  # type: ignore[no-untyped-def]
+    F, G, dV, tau, tangent, pressure, modes, bulk, components, nodes, places, packed
+):
     """Fill the packed upper triangles ``packed (m, d n (d n + 1)/2)`` of the element stiffness matrices.
 
     ``K_ab = ∫ g_a · (c + τ) · g_b dV + Σ_kl D_kl b_k b_l`` with the element's pressure condensed (Simo, Taylor and
     Pister 1985), ``b_k = ∫ ψ_k ∂J/∂u dV``. `pressure` ``(m, q)`` is the one that the geometric part uses, `bulk`
-    ``(m, k, k)`` is D, ``∫ ψ_k U'' ψ_l dV / V²``, and `places` is :func:`packing`.
+    ``(m, k, k)`` is D, ``∫ ψ_k U'' ψ_l dV / V²``, and `places` is :func:`packing`. `components` and `nodes` are
+    :func:`counted`: loops of a known length take half the time.
     """
-    n_nodes = G.shape[3]
     for chunk in nb.prange(CHUNKS):
+        d, n = len(components), len(nodes)
         inv = np.empty((3, 3))
-        g = np.empty((3, n_nodes))
+        g = np.empty((3, n))
         A = np.empty((d, 3, d, 3))
-        half = np.empty((3, d * n_nodes))
-        K = np.empty((d, n_nodes, d * n_nodes))
-        b = np.empty((modes.shape[2], d, n_nodes))
+        half = np.empty((3, d * n))
+        K = np.empty((d, n, d * n))
+        b = np.empty((modes.shape[2], d, n))
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
             K[:] = 0.0
             b[:] = 0.0
             for q in range(G.shape[1]):
                 J = spatial_gradients(F[e, q], G[e, q], inv, g)
                 elasticity(tau[e, q], tangent[e, q], pressure[e, q] * J, dV[e, q], A)
-                add_products(A, g, half, K)
+                add_products(A, g, half, d, n, K)
                 add_volume_gradients(J * dV[e, q], g, modes[e, q], b)
-            add_condensed(bulk[e], b.reshape(modes.shape[2], d * n_nodes), K)
+            add_condensed(bulk[e], b.reshape(modes.shape[2], d * n), d, n, K)
             flat = K.ravel()
             for at in range(len(places)):
                 packed[e, at] = flat[places[at]]

@@ -256,7 +256,8 @@ class Solid(Mixed):
             self._pressure(self._lagged_dilatation(lagged)),
             self.modes,
             bulk,
-            self.cell.dimension,
+            kernels.counted(self.cell.dimension),
+            kernels.counted(self.cell.n_nodes),
             self._places,
             out,
         )

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.bending import FibreBending
@@ -30,7 +31,7 @@ from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
 from turgor.fem.term import Loaded, Mixed, Term
-from turgor.fem.threads import choose_threads, dense_products_on_one_thread
+from turgor.fem.threads import choose_threads
 from turgor.fem.volumes import VolumeEquations
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.mesh import Mesh

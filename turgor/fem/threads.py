@@ -1,14 +1,11 @@
-"""The threads that the element kernels run on, and those that would stand in their way."""
+"""The threads that the element kernels run on."""
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numba
-from threadpoolctl import ThreadpoolController
 
 from turgor.common.optional import is_available, shared_library
 
@@ -25,19 +22,3 @@ def choose_threads() -> None:
         return
     has_tbb = is_available("numba.np.ufunc.tbbpool") and shared_library("tbb", "libtbb.so.12", "tbb12.dll") is not None
     numba.config.THREADING_LAYER = "tbb" if has_tbb else "workqueue"
-
-
-@contextmanager
-def dense_products_on_one_thread() -> Iterator[None]:
-    """Let OpenBLAS, NumPy's and SciPy's, work on the calling thread alone for a while.
-
-    Its own threads spin for some hundredths of a second after every product, on the processors that the kernels need;
-    the products of a step are too small to gain anything by them.
-    """
-    with _openblas().limit(limits=1):
-        yield
-
-
-@functools.cache
-def _openblas() -> ThreadpoolController:
-    return ThreadpoolController().select(internal_api="openblas")

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError
 from turgor.mesh.cells import (
     CELLS,
@@ -68,6 +69,7 @@ class Mesh:
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
     caps: Mapping[str, IntArray] = field(default_factory=dict)
 
+    @dense_products_on_one_thread()
     def __post_init__(self) -> None:
         self._set("cells", _frozen_cells(self.cells, np.shape(self.points)[-1:]))
         d, face_nodes = self.dimension, self.cell.faces.shape[1]

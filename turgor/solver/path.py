@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
-from turgor.fem.threads import dense_products_on_one_thread
 from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
