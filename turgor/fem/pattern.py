@@ -64,10 +64,8 @@ class SparsePattern:
 
     Attributes
     ----------
-    row_start, column
-        The compressed rows, zero-based, columns ascending; the first entry of each row is its diagonal.
-    n_free, n_stored
-        Number of unknowns and of stored entries.
+    n_free
+        Number of unknowns.
     packed_offsets
         Where each group's packed entries begin in the shared buffer, ``(n_groups + 1,)``.
     """
@@ -89,15 +87,18 @@ class SparsePattern:
         self._groups = groups
 
     @property
-    def row_start(self) -> Ints:  # noqa: D102
+    def row_start(self) -> Ints:
+        """Where the rows begin, zero-based, ``(n_free + 1,)``."""
         return self._rows[2]
 
     @property
-    def column(self) -> Ints:  # noqa: D102
+    def column(self) -> Ints:
+        """The columns of the stored entries, ascending in each row, the first of which is its diagonal."""
         return self._rows[3]
 
     @property
-    def n_stored(self) -> int:  # noqa: D102
+    def n_stored(self) -> int:
+        """Number of stored entries."""
         return len(self.column)
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
