@@ -92,6 +92,12 @@ Near its equilibria the tangent need not be definite, and the merit would shorte
 20 and 30 kPa took 34 and 46 iterations in place of 23 and 34.
 """
 
+ENOUGH = 0.25
+"""A step is halved where the merit falls by less than this part of what it falls by after half the step.
+
+Points may then go to and fro over a groove between two faces, which the tangent on neither side knows of.
+"""
+
 ROUNDING = 1e-9
 """Part of the merit by which it may rise through rounding."""
 
@@ -201,15 +207,19 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
 
 
 def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float) -> float:
-    """Return the longest of a few ever shorter parts of the step with which the merit falls, or else the best.
+    """Return the longest of a few ever shorter parts of the step with which the merit falls enough, or else the best.
 
     With a barrier it is the longest too where the forces are less out of balance after it.
     """
     start = system.merit(state, lagged)
+    rounding = ROUNDING * abs(start)
     parts, merits = [longest], [system.merit(state.moved(longest * du), lagged)]
-    while merits[-1] > start + ROUNDING * abs(start) and len(parts) < TRIALS:
+    while len(parts) < TRIALS:
         parts.append(0.5 * parts[-1])
         merits.append(system.merit(state.moved(parts[-1] * du), lagged))
+        if merits[-2] <= start - ENOUGH * max(start - merits[-1], 0.0) + rounding:
+            del parts[-1], merits[-1]
+            break
     best = parts[int(np.argmin(merits))]
     return longest if best < longest and system.has_barrier and _balances(system, state, longest * du) else best
 

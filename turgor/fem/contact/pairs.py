@@ -1,9 +1,9 @@
 """Kernels of contact between curved faces: closest points, gaps and their derivatives.
 
 A pair is a point of one face (the slave, at a quadrature point) and the closest point of another (the master), both
-faces curved. Its gap is ``g = n · (x − y)``, n the master's unit normal at the closest point y: negative where they
-overlap. Shapes: ``k`` faces of ``n`` nodes, ``q`` quadrature points a face, ``d`` displacement components; the nodes of
-a pair are the slave's, then the master's.
+faces curved. Its gap is ``g = n · (x − y)``, n the direction of contact at the closest point y
+(:mod:`turgor.fem.contact.closest`): negative where they overlap. Shapes: ``k`` faces of ``n`` nodes, ``q`` quadrature
+points a face, ``d`` displacement components; the nodes of a pair are the slave's, then the master's.
 
 Faces are six-node triangles or nine-node quadrilaterals (d = 3) or, in the plane z = 0, three-node edges (d = 2). One
 set of kernels serves all, by the shape functions of :mod:`turgor.fem.contact.shapes`: the second tangent of an edge is
@@ -16,16 +16,15 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.contact.closest import contact_normal, dot, free_inverse, gap_to, surface_frame
 from turgor.fem.contact.shapes import (
-    EDGE,
     control_weights,
-    flat_projection,
-    inside,
     middle,
+    on_rim,
     second_derivatives,
     shape_functions,
 )
-from turgor.fem.kernels import inlined, jit, parallel
+from turgor.fem.kernels import jit, parallel
 from turgor.mesh.cells import CELLS
 
 Floats = NDArray[np.float64]
@@ -34,42 +33,13 @@ Ints = NDArray[np.int32]
 FACING = -0.5
 """Two faces meet where the cosine between their normals is below this."""
 
-OUTSIDE = 0.05
-"""A closest point may lie so far outside the master (in its local coordinates), so that no gap opens between faces."""
-
-SURE = 2.0
-"""A point whose projection on the flat face of the corners lies so far outside is not looked at further."""
-
 BULGE = 1.2
 """What lies so little outside a face is within so many radii of the ball that the face itself lies in."""
 
+SAME = 1e-6
+"""Places that are nearer to each other than this part of a face are the same."""
+
 NOWHERE = -1
-
-
-@inlined
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """Return the scalar product of two vectors ``(3,)``."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def surface_frame(x, face, N, D, position, tangent, normal):  # type: ignore[no-untyped-def]
-    """Write position, tangents ``(2, 3)`` and unit normal of a face where its shape functions are `N` and `D`."""
-    position[:] = 0.0
-    tangent[:] = 0.0
-    for a in range(len(N)):
-        for i in range(3):
-            value = x[face[a], i]
-            position[i] += N[a] * value
-            tangent[0, i] += D[a, 0] * value
-            tangent[1, i] += D[a, 1] * value
-    if len(N) == EDGE:
-        tangent[1, 2] = 1.0
-    first, second = tangent[0], tangent[1]
-    normal[0] = first[1] * second[2] - first[2] * second[1]
-    normal[1] = first[2] * second[0] - first[0] * second[2]
-    normal[2] = first[0] * second[1] - first[1] * second[0]
-    normal /= np.sqrt(dot(normal, normal))
 
 
 def balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
@@ -101,55 +71,15 @@ def _fill_balls(x, faces, control, centre, normal, radius):  # type: ignore[no-u
         radius[f] = np.sqrt(square)
 
 
-@jit
-def closest_point(x, face, point, local, N, D, second, position, tangent, normal):  # type: ignore[no-untyped-def]
-    """Find the closest point of a curved face by Newton's method from `local` on; False if there is none near.
-
-    Writes its local coordinates, shape functions and frame.
-    """
-    for _ in range(12):
-        shape_functions(local[0], local[1], N, D)
-        second_derivatives(local[0], local[1], second)
-        surface_frame(x, face, N, D, position, tangent, normal)
-        away = point - position
-        r0, r1 = dot(away, tangent[0]), dot(away, tangent[1])
-        m00, m01, m11 = dot(tangent[0], tangent[0]), dot(tangent[0], tangent[1]), dot(tangent[1], tangent[1])
-        a00, a01, a11 = m00, m01, m11
-        for a in range(len(face)):
-            along = dot(away, x[face[a]])
-            a00 -= second[a, 0] * along
-            a11 -= second[a, 1] * along
-            a01 -= second[a, 2] * along
-        determinant = a00 * a11 - a01 * a01
-        if a00 <= 0.0 or determinant <= 0.01 * (m00 * m11 - m01 * m01):
-            # Too far off for the curvature to be of use: as if the face were flat.
-            a00, a01, a11 = m00, m01, m11
-            determinant = m00 * m11 - m01 * m01
-            if determinant <= 0.0:
-                return False
-        d0, d1 = (a11 * r0 - a01 * r1) / determinant, (a00 * r1 - a01 * r0) / determinant
-        size = max(abs(d0), abs(d1))
-        if size > 0.5:
-            d0, d1 = 0.5 * d0 / size, 0.5 * d1 / size
-        if size < 1e-13:
-            return True
-        local[0] += d0
-        local[1] += d1
-        if not inside(len(face), local, SURE):
-            return False
-        if size < 1e-8:
-            # Newton's method squares the error: one more evaluation is exact.
-            shape_functions(local[0], local[1], N, D)
-            surface_frame(x, face, N, D, position, tangent, normal)
-            return True
-    return False
-
-
 @parallel
 def find_partners(  # type: ignore[no-untyped-def]
     x, faces, centre, radius, rule, start, candidates, depth, margin, reach, partner, local, gap
 ):
-    """Find for each quadrature point the face that it overlaps, or is within a margin of, or else the one in front.
+    """Find for each quadrature point the nearest face that it may meet.
+
+    The nearest place of all faces moves steadily along with the point, over a groove on the rim that two faces share,
+    and so the gap does not jump. Only such a rim counts: beyond the rim of one face alone lies the end of the surface,
+    or another face that is nearer.
 
     Parameters
     ----------
@@ -162,49 +92,52 @@ def find_partners(  # type: ignore[no-untyped-def]
     start, candidates
         The candidates for face ``f`` are ``candidates[start[f]:start[f + 1]]``.
     depth, margin, reach
-        How far a point may lie behind a face ``(k,)`` (the smaller of the two counts), how far in front of it it counts
-        as overlapping it all the same, and how far in front it is looked for.
+        How far a point may lie behind a face ``(k,)`` (the smaller of the two counts), how far in front of its own face
+        it is taken to lie, and how far in front of the other it then is at most.
     partner, local, gap
         Results: the master ``(k, q)`` (:data:`NOWHERE` if there is none), the closest point ``(k, q, 2)``, the gap
-        ``(k, q)``. An overlapped face comes before one in front, the nearer before the farther.
+        ``(k, q)``.
     """
     n = faces.shape[1]
     for f in nb.prange(len(faces)):
         N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
         point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
+        rim_place, rim_local = np.empty(3), np.empty(2)
         for q in range(len(rule)):
             partner[f, q] = NOWHERE
             gap[f, q] = np.inf
             if start[f] == start[f + 1]:
                 continue
+            rim_gap, rim_face, sharing = np.inf, NOWHERE, 0
             shape_functions(rule[q, 0], rule[q, 1], N, D)
             surface_frame(x, faces[f], N, D, point, tangent, outward)
+            point += margin * outward
             for c in range(start[f], start[f + 1]):
                 m = candidates[c]
+                deepest = min(depth[f], depth[m])
                 square = 0.0
                 for i in range(3):
                     square += (point[i] - centre[m, i]) ** 2
-                far = BULGE * radius[m] + max(reach, min(depth[f], depth[m]))
+                far = BULGE * radius[m] + max(reach, deepest)
                 if square > far * far:
                     continue
-                if not flat_projection(x, faces[m], point, trial) or not inside(n, trial, 0.5):
+                g = gap_to(x, faces[m], point, trial, N, D, second, position, tangent, normal)
+                if g < -deepest or g > reach or dot(outward, normal) > FACING:
                     continue
-                if not closest_point(x, faces[m], point, trial, N, D, second, position, tangent, normal):
-                    continue
-                if not inside(n, trial, OUTSIDE) or dot(outward, normal) > FACING:
-                    continue
-                g = dot(normal, point - position)
-                if g < -min(depth[f], depth[m]) or g > reach:
-                    continue
-                best = gap[f, q]
-                if (g < margin and (best >= margin or g > best)) or (g >= margin and best >= margin and g < best):
-                    partner[f, q] = m
-                    gap[f, q] = g
-                    local[f, q] = trial
+                rim = on_rim(n, trial)
+                if not rim and abs(g) < abs(gap[f, q]):
+                    partner[f, q], gap[f, q], local[f, q] = m, g, trial
+                elif rim and np.abs(position - rim_place).max() < SAME * radius[m] and rim_face != NOWHERE:
+                    sharing += 1
+                elif rim and abs(g) < abs(rim_gap):
+                    rim_face, rim_gap, sharing = m, g, 1
+                    rim_place[:], rim_local[:] = position, trial
+            if sharing > 1 and abs(rim_gap) < abs(gap[f, q]):
+                partner[f, q], gap[f, q], local[f, q] = rim_face, rim_gap, rim_local
 
 
 @parallel
-def gap_gradients(x, slaves, masters, at, local, gradient):  # type: ignore[no-untyped-def]
+def gap_gradients(x, slaves, masters, at, local, margin, gradient):  # type: ignore[no-untyped-def]
     """Fill the derivatives of gaps with respect to their nodes, ``gradient (n_pairs, 2 n, d)``.
 
     `slaves` and `masters` are ``(n_pairs, n)``; `at` and `local` ``(n_pairs, 2)`` are the points on them. The closest
@@ -212,67 +145,120 @@ def gap_gradients(x, slaves, masters, at, local, gradient):  # type: ignore[no-u
     """
     n, d = slaves.shape[1], gradient.shape[2]
     for p in nb.prange(len(slaves)):
-        N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
-        shape_functions(local[p, 0], local[p, 1], N, D)
-        surface_frame(x, masters[p], N, D, position, tangent, normal)
-        for a in range(n):
+        N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
+        own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
+        _pair_frame(x, slaves[p], masters[p], at[p], local[p], margin, N, D, own, outward, tangent, normal, apart)
+        for a in range(2 * n):
             for i in range(d):
-                gradient[p, n + a, i] = -N[a] * normal[i]
-        shape_functions(at[p, 0], at[p, 1], N, D)
-        for a in range(n):
-            for i in range(d):
-                gradient[p, a, i] = N[a] * normal[i]
+                gradient[p, a, i] = dot(apart[a, i], normal)
+
+
+@jit
+def _pair_frame(  # type: ignore[no-untyped-def]
+    x, slave, master, at, local, margin, N, D, own, outward, tangent, normal, apart
+):
+    """Write what a pair looks like: the shape functions of the master last.
+
+    ``own (2, 3)`` and `outward` are the slave's contravariant tangents and its normal, ``tangent (2, 3)`` the master's
+    tangents, `normal` the direction of contact, ``apart (2 n, d, 3)`` the derivatives of ``x − y`` by the nodes.
+    """
+    n, d = len(slave), apart.shape[1]
+    position = np.empty(3)
+    shape_functions(at[0], at[1], N, D)
+    surface_frame(x, slave, N, D, position, tangent, outward)
+    point = position + margin * outward
+    own[:] = np.linalg.inv(tangent @ tangent.T) @ tangent
+    apart[:] = 0.0
+    for a in range(n):
+        for i in range(d):
+            apart[a, i] = -margin * outward[i] * (D[a, 0] * own[0] + D[a, 1] * own[1])
+            apart[a, i, i] += N[a]
+    shape_functions(local[0], local[1], N, D)
+    surface_frame(x, master, N, D, position, tangent, normal)
+    contact_normal(point, position, local, tangent, n, normal)
+    for a in range(n):
+        for i in range(d):
+            apart[n + a, i, i] = -N[a]
+
+
+@jit
+def _add_coating(at, own, outward, normal, factor, N, D, value):  # type: ignore[no-untyped-def]
+    """Add ``factor · n · δ²ν`` to ``value (rows, rows)``, ν the slave's normal: the margin is a coating along it.
+
+    With ``U_β = ν · δa_β`` and ``V_βγ = a^β · δa_γ`` (a the slave's tangents) it is ``δν = −a^β U_β`` and
+    ``n · δ²ν = 2 (n · a^γ) U_β V_βγ − (n · ν) m^βγ U_β U_γ``.
+    """
+    n, rows = len(N), len(value)
+    d = rows // (2 * n)
+    shape_functions(at[0], at[1], N, D)
+    U, V = np.zeros((2, rows)), np.zeros((2, 2, rows))
+    for a in range(n):
+        for i in range(d):
+            for b in range(2):
+                U[b, d * a + i] = outward[i] * D[a, b]
+                for c in range(2):
+                    V[b, c, d * a + i] = own[b, i] * D[a, c]
+    metric, facing = own @ own.T, dot(normal, outward)
+    for b in range(2):
+        for c in range(2):
+            mixed = np.outer(U[b], V[b, c])
+            value += factor * dot(normal, own[c]) * (mixed + mixed.T)
+            value -= factor * facing * metric[b, c] * np.outer(U[b], U[c])
 
 
 @parallel
-def pair_stiffness(x, slaves, masters, at, local, gap, normal_stiffness, force, d, packed):  # type: ignore[no-untyped-def]
+def pair_stiffness(  # type: ignore[no-untyped-def]
+    x, slaves, masters, at, local, margin, gap, normal_stiffness, force, d, packed
+):
     """Fill the packed upper triangles ``packed (n_pairs, …)``, of ``2 n d`` rows, of ``k ∇g ⊗ ∇g + F ∇²g``.
 
     With ``T_α = ∂(x − y)·a_α`` and ``N_α = n · ∂a_α`` (a_α the tangents, m the metric, b the curvature of the master,
     A = m − g b) the second derivative of the gap is (as in Wriggers 2006, sec. 4.1, in another notation)
-    ``−(N A⁻¹ T + T A⁻¹ N + g N A⁻¹ N + T m⁻¹ b A⁻¹ T)``, symmetric.
+    ``−(N A⁻¹ T + T A⁻¹ N + g N A⁻¹ N + T m⁻¹ b A⁻¹ T)``, symmetric. On the rim of a face A and m are inverted only
+    among the ways in which the closest point moves, and ``∂(x − y)·q ∂(x − y)·q / g`` is added for each direction q
+    across them and n: with ``F = k g`` a spring of stiffness k, whatever the gap.
 
-    `normal_stiffness` k and `force` F (negative in compression, lagged) are ``(n_pairs,)``.
+    `gap` is measured from the coating of thickness `margin`; `normal_stiffness` k and `force` F (negative in
+    compression, lagged) are ``(n_pairs,)``.
     """
     n = slaves.shape[1]
     rows = 2 * n * d
     for p in nb.prange(len(slaves)):
-        N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
-        second, shape_at = np.empty((n, 3)), np.empty(2 * n)
+        N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
+        own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
+        second, across = np.empty((n, 3)), np.zeros((3, 3))
         m, b, A = np.empty((2, 2)), np.zeros((2, 2)), np.empty((2, 2))
-        G, T, S = np.empty(rows), np.empty((2, rows)), np.zeros((2, rows))
-        shape_functions(at[p, 0], at[p, 1], N, D)
-        shape_at[:n] = N
-        shape_functions(local[p, 0], local[p, 1], N, D)
-        shape_at[n:] = -N
+        inverse, inverse_metric = np.empty((2, 2)), np.empty((2, 2))
+        S = np.zeros((2, rows))
+        _pair_frame(x, slaves[p], masters[p], at[p], local[p], margin, N, D, own, outward, tangent, normal, apart)
         second_derivatives(local[p, 0], local[p, 1], second)
-        surface_frame(x, masters[p], N, D, position, tangent, normal)
         for a in range(n):
             height = dot(normal, x[masters[p, a]])
             b[0, 0] += second[a, 0] * height
             b[1, 1] += second[a, 1] * height
             b[0, 1] += second[a, 2] * height
+            for i in range(d):
+                for r in range(2):
+                    S[r, d * (n + a) + i] = D[a, r] * normal[i]
         b[1, 0] = b[0, 1]
         for r in range(2):
             for s in range(2):
                 m[r, s] = dot(tangent[r], tangent[s])
                 A[r, s] = m[r, s] - gap[p] * b[r, s]
-        for a in range(2 * n):
-            for i in range(d):
-                G[d * a + i] = shape_at[a] * normal[i]
-                for r in range(2):
-                    T[r, d * a + i] = shape_at[a] * tangent[r, i]
-                    if a >= n:
-                        S[r, d * a + i] = D[a - n, r] * normal[i]
-        inverse = np.linalg.inv(A)
-        curved = np.linalg.inv(m) @ b @ inverse
-        AT, AS, CT = inverse @ T, inverse @ S, curved @ T
-        F = force[p]
+        free_inverse(n, local[p], A, inverse)
+        free_inverse(n, local[p], m, inverse_metric)
+        by_node = apart.reshape(rows, 3)
+        G, T = by_node @ normal, tangent @ by_node.T
+        AT, AS, CT = inverse @ T, inverse @ S, inverse_metric @ b @ inverse @ T
+        value = normal_stiffness[p] * np.outer(G, G)
+        value -= force[p] * (S.T @ (AT + gap[p] * AS) + T.T @ (AS + CT))
+        if on_rim(n, local[p]):
+            across[:] = np.eye(3) - np.outer(normal, normal) - tangent.T @ inverse_metric @ tangent
+            value += normal_stiffness[p] * (by_node @ across @ by_node.T)
+        if margin > 0.0:
+            _add_coating(at[p], own, outward, normal, margin * force[p], N, D, value)
         entry = 0
         for row in range(rows):
             for col in range(row, rows):
-                value = 0.0
-                for r in range(2):
-                    value += S[r, row] * (AT[r, col] + gap[p] * AS[r, col]) + T[r, row] * (AS[r, col] + CT[r, col])
-                packed[p, entry] = normal_stiffness[p] * G[row] * G[col] - F * value
+                packed[p, entry] = value[row, col]
                 entry += 1

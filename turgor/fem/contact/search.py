@@ -6,7 +6,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.contact.pairs import FACING, balls, dot
+from turgor.fem.contact.closest import dot
+from turgor.fem.contact.pairs import FACING, balls
 from turgor.fem.contact.skin import Skin
 from turgor.fem.kernels import jit, parallel
 

@@ -18,6 +18,12 @@ Floats = NDArray[np.float64]
 EDGE, TRIANGLE, SQUARE = 3, 6, 9
 """Numbers of nodes."""
 
+RIM = 1e-9
+"""A local point so little inside a face lies on its rim."""
+
+SIDES = 4
+"""A face has no more sides than that."""
+
 # Of each node of a square, which of the three functions of a line it has along either coordinate.
 _FIRST = np.array([0, 1, 1, 0, 2, 1, 2, 0, 2])
 _SECOND = np.array([0, 0, 1, 1, 0, 2, 1, 2, 2])
@@ -90,6 +96,58 @@ def inside(n_nodes, local, tolerance):  # type: ignore[no-untyped-def]
     if n_nodes == SQUARE:
         return local[0] < 1.0 + tolerance and local[1] < 1.0 + tolerance
     return local[0] + local[1] < 1.0 + tolerance
+
+
+@jit
+def on_rim(n_nodes, local):  # type: ignore[no-untyped-def]
+    """Whether local coordinates in the face lie on its rim."""
+    if n_nodes == EDGE:
+        return local[0] < RIM or local[0] > 1.0 - RIM
+    return not inside(n_nodes, local, -RIM)
+
+
+@jit
+def free_directions(n_nodes, local, free):  # type: ignore[no-untyped-def]
+    """Write into the rows of ``free (2, 2)`` how a local point moves within the face or along its rim; return how many.
+
+    Two inside, one on a side, none at a corner. Out of its plane an edge goes on for ever.
+    """
+    free[:] = 0.0
+    if n_nodes == TRIANGLE:
+        first, second, third = local[0] < RIM, local[1] < RIM, local[0] + local[1] > 1.0 - RIM
+        held = int(first) + int(second) + int(third)
+        free[0, 0] = 0.0 if first else 1.0
+        free[0, 1] = 1.0 if first else -1.0 if third else 0.0
+        free[1, 1] = 1.0
+        return max(2 - held, 0)
+    count = 0
+    for i in range(2):
+        held_here = local[i] < RIM or local[i] > 1.0 - RIM
+        if not held_here or (i == 1 and n_nodes == EDGE):
+            free[count, i] = 1.0
+            count += 1
+    return count
+
+
+@jit
+def side(n_nodes, number, local):  # type: ignore[no-untyped-def]
+    """Return whether a local point lies beyond a side of the face, and where that begins and leads to, (a, b) each.
+
+    The sides of an edge are its ends, which lead nowhere.
+    """
+    a, b = local[0], local[1]
+    if n_nodes == EDGE:
+        beyond = (number == 0 and a <= 0.0) or (number == 1 and a >= 1.0)
+        return beyond, float(number), 0.0, 0.0, 0.0
+    if number == 0:
+        return b <= 0.0, 0.0, 0.0, 1.0, 0.0
+    if number == 1:
+        return a <= 0.0, 0.0, 0.0, 0.0, 1.0
+    if n_nodes == TRIANGLE:
+        return number == 2 and a + b >= 1.0, 1.0, 0.0, -1.0, 1.0
+    if number == 2:
+        return b >= 1.0, 0.0, 1.0, 1.0, 0.0
+    return a >= 1.0, 1.0, 0.0, 0.0, 1.0
 
 
 @jit

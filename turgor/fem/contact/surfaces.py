@@ -32,8 +32,9 @@ class Pairs:
     """Points of the skin and the faces they meet.
 
     ``face`` and ``quad`` ``(n,)`` number the quadrature point, ``masters`` ``(n,)`` the face opposite; ``at`` and
-    ``local`` ``(n, 2)`` are the local coordinates on both, ``gap`` ``(n,)`` is negative where they overlap, ``overlap``
-    ``(n,)`` the gap less the margin, negative where they press on each other.
+    ``local`` ``(n, 2)`` are the local coordinates on both, ``overlap`` ``(n,)`` is the gap measured from the margin's
+    coating, negative where they press on each other, and ``gap`` ``(n,)`` that and the margin, negative where they
+    overlap.
     """
 
     face: Indices
@@ -50,13 +51,15 @@ class Pairs:
 
 
 class SurfaceContact:
-    """½ Σ ε w min(0, g − m)² over the quadrature points of all faces, w half the reference area of a point, g its gap.
+    """½ Σ ε w min(0, g)² over the quadrature points of all faces, w half the reference area of a point, g its gap.
 
-    Every face is slave and master at once, hence the half. The margin m, ``State.margin``, is mostly zero. It is one
-    for all points: where it changed with the wall opposite, forces would jump as points pass from face to face.
+    Every face is slave and master at once, hence the half. A margin, ``State.margin``, mostly zero, is a coating of the
+    slave's faces along their normals, on which the points lie: taken off the gap, it would let points press in front of
+    grooves, where the closest point jumps from one face to the other. It is one for all points: where it changed with
+    the wall opposite, forces would jump as points pass from face to face.
 
     What lags are the overlaps: the geometric part of the stiffness takes the force that the last step predicted,
-    F ← ε w min(0, g − m + ∂g·δu), so that a first touch or a long step does not throw the iteration off.
+    F ← ε w min(0, g + ∂g·δu), so that a first touch or a long step does not throw the iteration off.
 
     Parameters
     ----------
@@ -102,7 +105,7 @@ class SurfaceContact:
         """Add the contact forces, N."""
         pairs = self._touching(state)
         force = self._normal_stiffness(state, pairs) * pairs.overlap
-        add_at_nodes(self._nodes(pairs), force[:, None, None] * self._gradients(state.u, pairs), out)
+        add_at_nodes(self._nodes(pairs), force[:, None, None] * self._gradients(state.u, pairs, state.margin), out)
         self._rubbing(state).add_force(out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
@@ -117,7 +120,8 @@ class SurfaceContact:
         force = stiffness * np.minimum(lagged[pairs.face, pairs.quad], 0.0)
         slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
         x, d = skin.space(state.u), skin.dimension
-        pair_stiffness(x, slaves, masters, pairs.at, pairs.local, pairs.gap, stiffness, force, d, packed)
+        places = (slaves, masters, pairs.at, pairs.local)
+        pair_stiffness(x, *places, state.margin, pairs.overlap, stiffness, force, d, packed)
         rubbing = self._rubbing(state)
         return np.vstack([nodes, rubbing.nodes]), np.vstack([packed, rubbing.blocks()])
 
@@ -141,7 +145,7 @@ class SurfaceContact:
     def lagged_after(self, state: State, du: Floats) -> Floats:
         """Return the gaps less the margin that the step `du` predicts, ``(k, q)``, never positive."""
         pairs = self._touching(state)
-        return self._at_points(pairs, np.minimum(pairs.overlap + self._rates(state.u, pairs, du), 0.0))
+        return self._at_points(pairs, np.minimum(pairs.overlap + self._rates(state.u, pairs, du, state.margin), 0.0))
 
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much to be seen.
@@ -195,7 +199,7 @@ class SurfaceContact:
         pairs = self._touching(state)
         force = -self._normal_stiffness(state, pairs) * pairs.overlap
         # The slave's part of the gap's gradient is its normal times shape functions, whose sum is one.
-        normal = self._gradients(state.u, pairs)[:, : self.skin.faces.shape[1]].sum(axis=1)
+        normal = self._gradients(state.u, pairs, state.margin)[:, : self.skin.faces.shape[1]].sum(axis=1)
         place = np.column_stack([pairs.masters, pairs.local])
         rubs = self._rubbing(state)
         slip = rubs.elastic_slip if dragged else rubs.slip
@@ -217,7 +221,7 @@ class SurfaceContact:
         return self._recent(state.u, state.margin)
 
     def _overlapping(self, u: Floats, margin: float) -> Pairs:
-        pairs = self._pairs(self.skin.space(u), margin, margin)
+        pairs = self._pairs(self.skin.space(u), 0.0, margin)
         return pairs.where(pairs.overlap < 0.0)
 
     def _pairs(self, x: Floats, reach: float, margin: float = 0.0) -> Pairs:
@@ -230,21 +234,21 @@ class SurfaceContact:
             x, skin.faces, centre, radius, skin.rule, start, candidates, skin.depth, margin, reach, partner, local, gap
         )
         face, quad = np.nonzero(partner != NOWHERE)
-        gap = gap[face, quad]
-        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], gap, gap - margin)
+        overlap = gap[face, quad]
+        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], overlap + margin, overlap)
 
     def _nodes(self, pairs: Pairs) -> Ints:
         return np.hstack([self.skin.faces[pairs.face], self.skin.faces[pairs.masters]])
 
-    def _gradients(self, u: Floats, pairs: Pairs) -> Floats:
+    def _gradients(self, u: Floats, pairs: Pairs, margin: float = 0.0) -> Floats:
         skin = self.skin
         gradient = np.empty((len(pairs.gap), 2 * skin.faces.shape[1], skin.dimension))
         slaves, masters = skin.faces[pairs.face], skin.faces[pairs.masters]
-        gap_gradients(skin.space(u), slaves, masters, pairs.at, pairs.local, gradient)
+        gap_gradients(skin.space(u), slaves, masters, pairs.at, pairs.local, margin, gradient)
         return gradient
 
-    def _rates(self, u: Floats, pairs: Pairs, du: Floats) -> Floats:
-        return np.asarray(np.einsum("nai,nai->n", self._gradients(u, pairs), du[self._nodes(pairs)]))
+    def _rates(self, u: Floats, pairs: Pairs, du: Floats, margin: float = 0.0) -> Floats:
+        return np.asarray(np.einsum("nai,nai->n", self._gradients(u, pairs, margin), du[self._nodes(pairs)]))
 
     def _normal_stiffness(self, state: State, pairs: Pairs) -> Floats:
         return self._stiffness_between(state, pairs.face, pairs.quad, pairs.masters)
