@@ -154,8 +154,8 @@ def test_closest_points_are_closest(kind):
     start, candidates = np.array([0, 0, 1]), np.array([0], np.int32)
     shape_of = (2, len(skin.rule))
     partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
-    centre, _, radius = balls(points, faces)
-    find_partners(points, faces, centre, radius, skin.rule, start, candidates, np.ones(2), 0.0, 1.0, partner, at, gap)
+    where = (start, candidates, np.ones(2), 0.0, 1.0)
+    find_partners(points, faces, *balls(points, faces), skin.rule, *where, partner, at, gap)
     assert (partner[1] == 0).all()
     slaves = skin.shape @ points[faces[1]]
     nearest = np.array([np.linalg.norm(slave - surface, axis=1).min() for slave in slaves])
@@ -184,10 +184,12 @@ def test_kernels_know_the_faces_of_meshes_and_balls_hold_them(name):
     flat = np.pad(cell.nodes, ((0, 0), (0, 3 - d)))
     for bend in (0.0, 0.5):
         x = flat + bend * rng.uniform(-1.0, 1.0, (n, 3)) * [1, 1, d == 2]
-        centre, _, radius = balls(x, np.arange(n, dtype=np.int32)[None])
-        farthest = np.linalg.norm(cell.shape(grid) @ x - centre, axis=1).max()
-        assert farthest <= radius[0] * (1 + 1e-12)
-    centre, _, radius = balls(flat, np.arange(n, dtype=np.int32)[None])
+        centre, normal, radius, rise = balls(x, np.arange(n, dtype=np.int32)[None])
+        away = cell.shape(grid) @ x - centre
+        assert np.linalg.norm(away, axis=1).max() <= radius[0] * (1 + 1e-12)
+        assert np.abs(away @ normal[0]).max() <= rise[0] + 1e-12
+    centre, _, radius, rise = balls(flat, np.arange(n, dtype=np.int32)[None])
+    assert rise[0] < 1e-12
     assert radius[0] == pytest.approx(np.linalg.norm(flat - centre, axis=1).max())
 
 

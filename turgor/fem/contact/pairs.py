@@ -33,47 +33,47 @@ Ints = NDArray[np.int32]
 FACING = -0.5
 """Two faces meet where the cosine between their normals is below this."""
 
-BULGE = 1.2
-"""What lies so little outside a face is within so many radii of the ball that the face itself lies in."""
-
 SAME = 1e-6
 """Places that are nearer to each other than this part of a face are the same."""
 
 NOWHERE = -1
 
 
-def balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return centre ``(k, 3)``, unit normal ``(k, 3)`` and radius ``(k,)`` of balls that the faces lie in."""
-    centre, normal, radius = np.empty((len(faces), 3)), np.empty((len(faces), 3)), np.empty(len(faces))
-    _fill_balls(x, faces, _CONTROL[faces.shape[1]], centre, normal, radius)
-    return centre, normal, radius
+def balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return centre ``(k, 3)``, unit normal ``(k, 3)`` and radius ``(k,)`` of balls that the faces lie in.
+
+    And how far at most a face leaves the plane through the centre across the normal, ``(k,)``.
+    """
+    centre, normal = np.empty((len(faces), 3)), np.empty((len(faces), 3))
+    radius, rise = np.empty(len(faces)), np.empty(len(faces))
+    _fill_balls(x, faces, _CONTROL[faces.shape[1]], centre, normal, radius, rise)
+    return centre, normal, radius, rise
 
 
 _CONTROL = {CELLS[name].n_nodes: control_weights(CELLS[name]) for name in ("line3", "tri6", "quad9")}
 
 
 @parallel
-def _fill_balls(x, faces, control, centre, normal, radius):  # type: ignore[no-untyped-def]
+def _fill_balls(x, faces, control, centre, normal, radius, rise):  # type: ignore[no-untyped-def]
     n = faces.shape[1]
     for f in nb.prange(len(faces)):
-        N, D, tangent = np.empty(n), np.empty((n, 2)), np.empty((2, 3))
+        N, D, tangent, away = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
         shape_functions(middle(n), middle(n), N, D)
         surface_frame(x, faces[f], N, D, centre[f], tangent, normal[f])
-        square = 0.0
+        square = highest = 0.0
         for p in range(n):
-            away = 0.0
-            for i in range(3):
-                place = -centre[f, i]
-                for a in range(n):
-                    place += control[p, a] * x[faces[f, a], i]
-                away += place * place
-            square = max(square, away)
-        radius[f] = np.sqrt(square)
+            away[:] = -centre[f]
+            for a in range(n):
+                for i in range(3):
+                    away[i] += control[p, a] * x[faces[f, a], i]
+            square = max(square, dot(away, away))
+            highest = max(highest, abs(dot(away, normal[f])))
+        radius[f], rise[f] = np.sqrt(square), highest
 
 
 @parallel
 def find_partners(  # type: ignore[no-untyped-def]
-    x, faces, centre, radius, rule, start, candidates, depth, margin, reach, partner, local, gap
+    x, faces, centre, flat, radius, rise, rule, start, candidates, depth, margin, reach, partner, local, gap
 ):
     """Find for each quadrature point the nearest face that it may meet.
 
@@ -85,8 +85,8 @@ def find_partners(  # type: ignore[no-untyped-def]
     ----------
     x, faces
         Positions ``(n_points, 3)`` and faces ``(k, n)``.
-    centre, radius
-        Balls around the faces, ``(k, 3)`` and ``(k,)``; see :func:`balls`.
+    centre, flat, radius, rise
+        Balls around the faces, their normals and how thick they are; see :func:`balls`.
     rule
         Local coordinates of the quadrature points ``(q, 2)``.
     start, candidates
@@ -102,7 +102,7 @@ def find_partners(  # type: ignore[no-untyped-def]
     for f in nb.prange(len(faces)):
         N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
         point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
-        rim_place, rim_local = np.empty(3), np.empty(2)
+        away, rim_place, rim_local = np.empty(3), np.empty(3), np.empty(2)
         for q in range(len(rule)):
             partner[f, q] = NOWHERE
             gap[f, q] = np.inf
@@ -115,11 +115,9 @@ def find_partners(  # type: ignore[no-untyped-def]
             for c in range(start[f], start[f + 1]):
                 m = candidates[c]
                 deepest = min(depth[f], depth[m])
-                square = 0.0
-                for i in range(3):
-                    square += (point[i] - centre[m, i]) ** 2
-                far = BULGE * radius[m] + max(reach, deepest)
-                if square > far * far:
+                away[:] = point - centre[m]
+                height, far = dot(away, flat[m]), radius[m] + min(max(reach, deepest), abs(gap[f, q]))
+                if dot(away, away) > far * far or height > rise[m] + reach or -height > rise[m] + deepest:
                     continue
                 g = gap_to(x, faces[m], point, trial, N, D, second, position, tangent, normal)
                 if g < -deepest or g > reach or dot(outward, normal) > FACING:

@@ -47,7 +47,7 @@ class Search:
         self.skin = skin
         k = len(skin.faces)
         self._group = np.arange(k, dtype=np.int32) if group is None else group
-        self._rest = balls(skin.points, skin.faces)
+        self._rest = balls(skin.points, skin.faces)[:3]
         centre, normal, _ = self._rest
         # Faces that look the same way are put together, as if a right angle between them were this long a way.
         apart = 0.5 * float(np.linalg.norm(np.ptp(centre, axis=0)))
@@ -73,7 +73,7 @@ class Search:
         if not np.isfinite(x).all():
             # The iteration has gone astray, which is for the solver to say.
             return start, np.empty(0, np.int32)
-        centre, normal, radius = balls(x, skin.faces)
+        centre, normal, radius, _ = balls(x, skin.faces)
         boxes = np.empty((len(self._links), 2, 6))
         _fit(centre, normal, radius, self._links, self._order, boxes)
         corners = np.ascontiguousarray(skin.faces[:, : skin.cell.n_corners])

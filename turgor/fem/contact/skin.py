@@ -98,7 +98,7 @@ class Skin:
         self.shape = cell.shape_at_quadrature
         nodes = mesh.points[self.faces]
         self.area = _measures(nodes, cell) * cell.weights * depth(section, cell.shape_at_quadrature @ nodes)
-        centre_of_face, _, _ = balls(self.points, self.faces)
+        centre_of_face, *_ = balls(self.points, self.faces)
         part_of_node = _parts(mesh)
         self.part = part_of_node[self.faces[:, 0]]
         plain = face_areas(mesh.points[self.faces])
@@ -107,7 +107,7 @@ class Skin:
         self.wall = np.empty(len(faces))
         whole = boundary_faces(mesh.cells)
         for part in np.unique(self.part):
-            centre, normal, _ = balls(self.points, whole[part_of_node[whole[:, 0]] == part])
+            centre, normal, *_ = balls(self.points, whole[part_of_node[whole[:, 0]] == part])
             here = self.part == part
             _, same = cKDTree(centre).query(centre_of_face[here])
             self.wall[here] = wall_thickness(centre, normal)[same]

@@ -229,10 +229,8 @@ class SurfaceContact:
         shape = skin.area.shape
         partner, local, gap = np.empty(shape, np.int32), np.empty((*shape, 2)), np.empty(shape)
         start, candidates = self._search.candidates(x, reach)
-        centre, _, radius = balls(x, skin.faces)
-        find_partners(
-            x, skin.faces, centre, radius, skin.rule, start, candidates, skin.depth, margin, reach, partner, local, gap
-        )
+        where = (start, candidates, skin.depth, margin, reach)
+        find_partners(x, skin.faces, *balls(x, skin.faces), skin.rule, *where, partner, local, gap)
         face, quad = np.nonzero(partner != NOWHERE)
         overlap = gap[face, quad]
         return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], overlap + margin, overlap)
