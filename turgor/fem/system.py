@@ -127,7 +127,7 @@ class System:
         self._touching: list[tuple[Ints, Floats]] = []
         self.pattern = self._make_pattern()
         self._frames = BlockFrames(self.constraints, [term.nodes for term in self.terms])
-        self._packed = np.empty(0)
+        self._packed = np.empty(self.pattern.packed_offsets[-1])
 
     @property
     def n_dofs(self) -> int:
@@ -230,14 +230,8 @@ class System:
         """Return for each solid by how much its lagged dilatations exceed those of the displacement, ``(m, k)``."""
         return tuple(solid.lag(state, lagged) for solid, lagged in zip(self.solids, state.lagged, strict=False))
 
-    def forget_blocks(self) -> None:
-        """Set the memory of the element stiffnesses free, unless given displacements need :meth:`stiffness_times`."""
-        if not self.constraints.moves:
-            self._packed = np.empty(0)
-
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
-        assert len(self._packed) == self.pattern.packed_offsets[-1], "the element stiffnesses have been forgotten"
         local = self.constraints.to_frames(du)
         product = np.zeros_like(du)
         for k, term in enumerate(self.terms):
@@ -354,8 +348,6 @@ class System:
 
     def _fill_blocks(self, state: State, augmentation: float | None) -> list[VolumeEquations]:
         equations = []
-        if len(self._packed) != self.pattern.packed_offsets[-1]:
-            self._packed = np.empty(self.pattern.packed_offsets[-1])
         for k, term in enumerate(self.terms):
             block = self._block(k)
             if not block.size:

@@ -57,7 +57,6 @@ class LinearSolver(StiffnessSolver):
     def take_stiffness(self, system: System, state: State) -> None:
         """Factorise the stiffness of a state; its pattern is a new one where surfaces have come close to each other."""
         values = system.stiffness(state)
-        system.forget_blocks()
         if self.column is not system.pattern.column:
             self.take(system.pattern.row_start, system.pattern.column)
         self.factorise(values)
