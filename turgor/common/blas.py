@@ -14,7 +14,7 @@ from threadpoolctl import ThreadpoolController
 def dense_products_on_one_thread() -> Iterator[None]:
     """Let OpenBLAS, NumPy's and SciPy's, work on the calling thread alone for a while.
 
-    Its own threads spin for some hundredths of a second after every product, on the processors that the kernels need;
+    Its own threads spin for long after every product, on the processors that the kernels need;
     the products of a step are too small to gain anything by them.
     """
     with _openblas().limit(limits=1):
