@@ -96,6 +96,11 @@ IMPOSSIBLE = {
     "passage as high as the chamber": (PneuNet, {"tunnel_height": "13 mm"}, "tunnel_height"),
     "passage wider than the chamber": (PneuNet, {"tunnel_width": "10.5 mm"}, "tunnel_width"),
     "gaps filled": (PneuNet, {"tunnel_roof": "13 mm"}, "tunnel_roof"),
+    "gaps filled but for rounding": (
+        PneuNet,
+        {"chamber_height": "3.688 mm", "top_wall": "1 mm", "tunnel_height": "1 mm", "tunnel_roof": "3.688 mm"},
+        "tunnel_roof",
+    ),
     "half circle over a low chamber": (
         PneuNet,
         {"cross_section": "half-round", "chamber_width": "27 mm"},

@@ -83,7 +83,7 @@ class PneuNet(Actuator):
 
     def check(self) -> None:
         """Raise InputError if the chambers' walls meet, the passage does not fit them, or its roof fills the gaps."""
-        if self.tunnel_height >= self.chamber_height:
+        if self.tunnel_height >= self.chamber_height * (1 - 1e-9):
             self._refuse("tunnel_height", "the air passage is as high as the chambers", self.chamber_height)
         if self.cross_section == "half-round" and 2.0 * self.chamber_height < self.chamber_width:
             self._refuse("chamber_width", "the chambers are too low for a half circle", 2.0 * self.chamber_height)
@@ -93,7 +93,7 @@ class PneuNet(Actuator):
         if self.tunnel_width > room * (1 + 1e-9):
             self._refuse("tunnel_width", "the air passage is wider than the chambers at its roof", room)
         room = self.chamber_height + self.top_wall - self.tunnel_height
-        if self.tunnel_roof >= room:
+        if self.tunnel_roof >= room * (1 - 1e-9):
             self._refuse("tunnel_roof", "the roof of the passage fills the gaps: the chambers' walls meet", room)
 
     def _refuse(self, key: str, problem: str, limit: float) -> None:
