@@ -8,10 +8,15 @@ import numpy as np
 import psutil
 import pytest
 import scipy.sparse as sp
+from samples import neo_hookean
 
 from turgor.common.optional import is_available
+from turgor.fem.supports import Prescribed, Sliding
+from turgor.fem.system import System
+from turgor.mesh.structured import box
 from turgor.solver import linear
 from turgor.solver.linear import Mumps, Pardiso, SingularMatrixError, SuperLU, solver_in_use
+from turgor.solver.newton import NewtonOptions, find_equilibrium
 
 
 def upper_pattern(matrix):
@@ -40,8 +45,31 @@ def test_solution(kind, matrix):
     solver = kind(start, column)
     right = np.arange(60.0)
     for scale in (1.0, 3.0):  # the pattern is analysed once, the values change
+        solver.release_factors()
         solver.factorise(scale * values)
         np.testing.assert_allclose(solver.solve(right), np.linalg.solve(scale * matrix, right), rtol=1e-9)
+
+
+def test_a_large_model_keeps_neither_factors_nor_blocks_and_finds_the_same(monkeypatch):
+    # The displacement that is imposed asks for the elements' stiffnesses after the factorisation.
+    held = [Sliding("x0"), Sliding("y0"), Sliding("z0"), Prescribed("x1", (0.3, None, None))]
+    system = System(box((1.0, 1.0, 1.0), (2, 2, 2)), {"body": neo_hookean(ratio=100)}, held)
+    released = []
+
+    class Watched(solver_in_use()):
+        def release_factors(self):
+            released.append(self.n)
+            super().release_factors()
+
+    ends = []
+    for large in (system.n_dofs + 1, system.n_dofs):
+        monkeypatch.setattr(linear, "LARGE", large)
+        solver = Watched(system.pattern.row_start, system.pattern.column)
+        end = find_equilibrium(system, solver, system.reference_state(), 1.0, NewtonOptions())
+        ends.append(end.state.u)
+        assert len(released) == (0 if large > system.n_dofs else end.factorisations)
+    assert np.abs(ends[0]).max() > 0.29
+    np.testing.assert_array_equal(*ends)
 
 
 @pytest.mark.parametrize("kind", KINDS)

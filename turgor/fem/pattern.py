@@ -89,12 +89,12 @@ class SparsePattern:
     @property
     def row_start(self) -> Ints:
         """Where the rows begin, zero-based, ``(n_free + 1,)``."""
-        return self._rows[2]
+        return self._rows[1]
 
     @property
     def column(self) -> Ints:
         """The columns of the stored entries, ascending in each row, the first of which is its diagonal."""
-        return self._rows[3]
+        return self._rows[2]
 
     @property
     def n_stored(self) -> int:
@@ -103,10 +103,9 @@ class SparsePattern:
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
-        dof_start, place, *_ = self._rows
-        _sum_into_rows(
-            packed, *self._pairs, self._node_start, self._node_column, dof_start, place, self._dimension, out
-        )
+        number, row_start, _ = self._rows
+        nodes = (self._node_start, self._node_column)
+        _sum_into_rows(packed, *self._pairs, *nodes, number, row_start, self._dimension, out)
 
     def covers(self, nodes: Ints) -> bool:
         """Whether all nodes of each block ``(n_blocks, nodes_per_block)`` are coupled in this pattern."""
@@ -114,9 +113,7 @@ class SparsePattern:
 
     def add_blocks(self, nodes: Ints, packed: Floats, out: Floats) -> None:
         """Add packed blocks ``(n_blocks, packed)`` that the pattern covers to the stored values `out`."""
-        pairs = _find_pairs(nodes, self._node_start, self._node_column)
-        dof_start, place, *_ = self._rows
-        _add(nodes, pairs, packed, self._node_start, dof_start, self._dimension, place, out)
+        _add(nodes, packed, *self._rows, self._dimension, out)
 
     def graph(self) -> sp.csr_matrix:
         """Return which nodes are coupled, both ways, ``(n_nodes, n_nodes)``.
@@ -136,18 +133,16 @@ class SparsePattern:
         _sum_into_layout(packed, *self._pairs, *places, *nodes, out)
 
     @functools.cached_property
-    def _rows(self) -> tuple[Longs, Ints, Ints, Ints]:
-        """The compressed rows, and before them where those of all degrees of freedom would begin and what is stored.
+    def _rows(self) -> tuple[Ints, Ints, Ints]:
+        """The number of each degree of freedom among the unknowns, −1 if it is fixed, and the compressed rows.
 
         Only a factorisation asks for them.
         """
-        dof_start = _dof_row_starts(self._node_start, self._dimension)
-        place, column = np.empty(dof_start[-1], np.int32), np.empty(dof_start[-1], np.int32)
+        number = np.where(self.free, np.cumsum(self.free, dtype=np.int32) - np.int32(1), np.int32(-1))
+        column = np.empty(len(self._node_column) * self._dimension**2, np.int32)
         row_start = np.zeros(self.n_free + 1, np.int32)
-        number = np.cumsum(self.free, dtype=np.int32) - np.int32(1)
-        shape = (self._node_start, self._node_column, dof_start, self._dimension)
-        n_stored = _number(*shape, self.free, number, place, row_start, column)
-        return dof_start, place, row_start, column[:n_stored]
+        n_stored = _number(self._node_start, self._node_column, number, self._dimension, row_start, column)
+        return number, row_start, column[:n_stored]
 
     @functools.cached_property
     def _pairs(self) -> tuple[Longs, Ints, Ints]:
@@ -182,33 +177,22 @@ def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int6
     return coupled.indptr.astype(np.int64), coupled.indices.astype(np.int32)
 
 
-def _dof_row_starts(node_start: NDArray[np.int64], dimension: int) -> NDArray[np.int64]:
-    # Row i of a node's diagonal block holds dimension - i entries of that block, then whole blocks.
-    blocks = np.diff(node_start)
-    lengths = dimension * blocks[:, None] - np.arange(dimension)
-    lengths[blocks == 0] = 0
-    return np.concatenate([[0], np.cumsum(lengths.ravel())]).astype(np.int64)
-
-
 @nb.njit(cache=True)
-def _number(node_start, node_column, dof_start, dimension, free, number, place, row_start, column):  # type: ignore[no-untyped-def]
-    """Number the entries whose row and column are free; fill their `place`, −1 for the others, and the rows."""
+def _number(node_start, node_column, number, d, row_start, column):  # type: ignore[no-untyped-def]
+    """Fill the compressed rows of the unknowns; return how many entries they have."""
     at = 0
     for a in range(len(node_start) - 1):
-        for i in range(dimension):
-            row = a * dimension + i
-            entry = dof_start[row]
+        for i in range(d):
+            row = number[a * d + i]
+            if row < 0:
+                continue
             for m in range(node_start[a], node_start[a + 1]):
-                for k in range(i if m == node_start[a] else 0, dimension):
-                    other = node_column[m] * dimension + k
-                    place[entry] = -1
-                    if free[row] and free[other]:
-                        place[entry] = at
-                        column[at] = number[other]
+                for k in range(i if m == node_start[a] else 0, d):
+                    other = number[node_column[m] * d + k]
+                    if other >= 0:
+                        column[at] = other
                         at += 1
-                    entry += 1
-            if free[row]:
-                row_start[number[row] + 1] = at
+            row_start[row + 1] = at
     return at
 
 
@@ -276,42 +260,41 @@ def _all_coupled(group, node_start, node_column):  # type: ignore[no-untyped-def
 
 
 @nb.njit(cache=True)
-def _add(group, found, packed, node_start, dof_start, d, place, out):  # type: ignore[no-untyped-def]
+def _add(group, packed, number, row_start, column, d, out):  # type: ignore[no-untyped-def]
     """Add packed blocks to the stored values, entry by entry: for few of them no list is worth while."""
     n = group.shape[1]
     for block in range(len(group)):
-        m = 0
-        for row in range(n * d):
-            p, i = row // d, row % d
-            for col in range(row, n * d):
-                q, k = col // d, col % d
-                a, b = group[block, p], group[block, q]
-                # Of the two nodes the earlier one has the row; at a single node the lower component has it.
-                r, c = (k, i) if a > b or (a == b and i > k) else (i, k)
-                low = min(a, b)
-                rank = found[block, p * n - p * (p - 1) // 2 + q - p] - node_start[low]
-                entry = place[dof_start[low * d + r] + d * rank - r + c]
-                if entry >= 0:
+        at = 0
+        for first in range(n * d):
+            one = number[group[block, first // d] * d + first % d]
+            for second in range(first, n * d):
+                other = number[group[block, second // d] * d + second % d]
+                row, col = min(one, other), max(one, other)
+                if row >= 0:
+                    entry = row_start[row] + np.searchsorted(column[row_start[row] : row_start[row + 1]], col)
                     # The mirror image of an entry between two places of one node and component is the entry itself.
-                    out[entry] += packed[block, m] * (2.0 if a == b and p != q and i == k else 1.0)
-                m += 1
+                    out[entry] += packed[block, at] * (2.0 if row == col and first != second else 1.0)
+                at += 1
 
 
 @nb.njit(cache=True, parallel=True)
-def _sum_into_rows(packed, start, source, code, node_start, node_column, dof_start, place, d, out):  # type: ignore[no-untyped-def]
+def _sum_into_rows(packed, start, source, code, node_start, node_column, number, row_start, d, out):  # type: ignore[no-untyped-def]
     n_chunks = 64
     n = len(node_start) - 1
     for chunk in nb.prange(n_chunks):
-        block = np.empty((3, 3))
+        block, at = np.empty((3, 3)), np.empty(3, np.int64)
         for a in range(chunk * n // n_chunks, (chunk + 1) * n // n_chunks):
+            for i in range(d):
+                at[i] = row_start[max(number[a * d + i], 0)]
             for m in range(node_start[a], node_start[a + 1]):
                 _sum_pair(packed, start[m], start[m + 1], source, code, d, block)
+                b = node_column[m]
                 for i in range(d):
-                    row = dof_start[a * d + i] + d * (m - node_start[a]) - i
-                    for k in range(i if node_column[m] == a else 0, d):
-                        entry = place[row + k]
-                        if entry >= 0:
-                            out[entry] = block[i, k]
+                    if number[a * d + i] >= 0:
+                        for k in range(i if b == a else 0, d):
+                            if number[b * d + k] >= 0:
+                                out[at[i]] = block[i, k]
+                                at[i] += 1
 
 
 @nb.njit(cache=True, parallel=True)

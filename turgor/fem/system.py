@@ -127,7 +127,8 @@ class System:
         self._touching: list[tuple[Ints, Floats]] = []
         self.pattern = self._make_pattern()
         self._frames = BlockFrames(self.constraints, [term.nodes for term in self.terms])
-        self._packed = np.empty(self.pattern.packed_offsets[-1])
+        self._packed: Floats | None = None
+        self._stiffened: State | None = None
 
     @property
     def n_dofs(self) -> int:
@@ -203,16 +204,20 @@ class System:
         Where the pattern has no room for what touches now, :attr:`pattern`
         is another one afterwards.
         """
-        self._fill_blocks(state, None)
+        packed, _ = self._fill_blocks(state)
         self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
         if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
             self._couplings += [contact.couplings(state.u) for contact in self.contacts]
             self.pattern = self._make_pattern()
         values = np.empty(self.pattern.n_stored)
-        self.pattern.sum_blocks(self._packed, values)
-        for nodes, packed in self._touching:
-            self.pattern.add_blocks(nodes, packed, values)
+        self.pattern.sum_blocks(packed, values)
+        for nodes, touching in self._touching:
+            self.pattern.add_blocks(nodes, touching, values)
         return values
+
+    def forget_blocks(self) -> None:
+        """Give back the memory of the elements' stiffnesses; :meth:`stiffness_times` finds them again."""
+        self._packed = None
 
     def split_stiffness(
         self, state: State, augmentation: float, layout: BlockLayout, out: NDArray[np.floating]
@@ -222,8 +227,8 @@ class System:
         A is :meth:`stiffness` with, in every element, at most `augmentation` shear moduli in place of the bulk modulus;
         fixed components are identity. It knows nothing of contact.
         """
-        equations = self._fill_blocks(state, augmentation)
-        self.pattern.sum_into_layout(self._packed, layout, out)
+        packed, equations = self._fill_blocks(state, augmentation)
+        self.pattern.sum_into_layout(packed, layout, out)
         return equations
 
     def dilatation_lag(self, state: State) -> tuple[Floats, ...]:
@@ -232,11 +237,14 @@ class System:
 
     def stiffness_times(self, du: Floats) -> Floats:
         """Return the stiffness assembled last times a nodal field ``(n_points, d)``, fixed components included."""
+        if (packed := self._packed) is None:
+            assert self._stiffened is not None
+            packed, _ = self._fill_blocks(self._stiffened)
         local = self.constraints.to_frames(du)
         product = np.zeros_like(du)
         for k, term in enumerate(self.terms):
             if len(term.nodes):
-                block_products(term.nodes, self._block(k), local, product)
+                block_products(term.nodes, self._block(packed, k), local, product)
         for nodes, packed in self._touching:
             block_products(nodes, packed, local, product)
         return self.constraints.from_frames(product)
@@ -346,10 +354,13 @@ class System:
         """Return the smallest det F over all quadrature points and the cell where it is."""
         return min(solid.worst_jacobian(u) for solid in self.solids)
 
-    def _fill_blocks(self, state: State, augmentation: float | None) -> list[VolumeEquations]:
+    def _fill_blocks(self, state: State, augmentation: float | None = None) -> tuple[Floats, list[VolumeEquations]]:
+        if self._packed is None:
+            self._packed = np.empty(self.pattern.packed_offsets[-1])
+        self._stiffened = state
         equations = []
         for k, term in enumerate(self.terms):
-            block = self._block(k)
+            block = self._block(self._packed, k)
             if not block.size:
                 continue
             if augmentation is not None and isinstance(term, Solid):
@@ -357,12 +368,12 @@ class System:
             else:
                 term.stiffness(state, state.lagged[k], block)
             self._frames.turn(k, block)
-        return equations
+        return self._packed, equations
 
-    def _block(self, k: int) -> Floats:
+    def _block(self, packed: Floats, k: int) -> Floats:
         begin, end = self.pattern.packed_offsets[k : k + 2]
         nodes = self.terms[k].nodes
-        return self._packed[begin:end].reshape(len(nodes), packed_size(self.mesh.dimension * nodes.shape[1]))
+        return packed[begin:end].reshape(len(nodes), packed_size(self.mesh.dimension * nodes.shape[1]))
 
     def _make_pattern(self) -> SparsePattern:
         free = ~self.constraints.fixed.ravel()

@@ -36,6 +36,10 @@ class SingularMatrixError(SolverError):
     """The matrix could not be factorised."""
 
 
+LARGE = 200_000
+"""Unknowns from which the memory counts more than the time in which the system hands it out anew."""
+
+
 class LinearSolver(StiffnessSolver):
     """A direct solver for symmetric, possibly indefinite matrices of one fixed pattern.
 
@@ -55,16 +59,27 @@ class LinearSolver(StiffnessSolver):
         self.n = len(row_start) - 1
 
     def take_stiffness(self, system: System, state: State) -> None:
-        """Factorise the stiffness of a state; its pattern is a new one where surfaces have come close to each other."""
+        """Factorise the stiffness of a state; its pattern is a new one where surfaces have come close to each other.
+
+        Of a large model neither the last factors are kept during the assembly, nor the elements' stiffnesses after it.
+        """
+        is_large = self.n >= LARGE
+        if is_large:
+            self.release_factors()
         values = system.stiffness(state)
         if self.column is not system.pattern.column:
             self.take(system.pattern.row_start, system.pattern.column)
+        if is_large:
+            system.forget_blocks()
         self.factorise(values)
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the step for a right-hand side, exact but for rounding."""
         del accuracy
         return Solution(system.nodal(self.solve(right)))
+
+    def release_factors(self) -> None:
+        """Give back the memory of the factors, where the library can do so and keep its analysis."""
 
     @abstractmethod
     def factorise(self, values: Floats) -> None:
@@ -111,7 +126,7 @@ BY_DEGREE = 500_000
 """Entries up to which unknowns are ordered by minimum degree, in half the time and with no more fill."""
 
 _SYMMETRIC_INDEFINITE = -2
-_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+_ANALYSE, _FACTORISE, _SOLVE, _RELEASE_FACTORS, _RELEASE = 11, 22, 33, 0, -1
 
 
 class Pardiso(LinearSolver):
@@ -170,6 +185,11 @@ class Pardiso(LinearSolver):
                 self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
             )
         self._call(_FACTORISE)
+
+    def release_factors(self) -> None:
+        """Give back the memory of the factors; the analysis is kept."""
+        if self._analysed:
+            self._call(_RELEASE_FACTORS)
 
     def solve(self, right: Floats) -> Floats:
         """Solve with the newest factors."""
