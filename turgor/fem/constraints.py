@@ -22,6 +22,9 @@ Condition = tuple[Floats, float, str]
 SAME_DIRECTION = 1e-6
 """Sine of the angle below which two constrained directions at a node count as one."""
 
+FLAT = 1e-9
+"""Component of a unit normal that counts as none, and by which the faces of a flat surface may look aside."""
+
 CREASE = np.cos(np.radians(25.0))
 """Faces of a sliding surface that meet at a node at a larger angle constrain it each in its own direction."""
 
@@ -82,24 +85,23 @@ def compile_constraints(
     InputError
         If two supports prescribe different displacements of one node in one direction, or one leaves the plane.
     """
-    rows = conditions_at_nodes(mesh, supports, section)
     fixed = np.zeros(mesh.points.shape, bool)
     values = np.zeros(mesh.points.shape)
-    nodes, frames = [], []
-    known: dict[tuple[tuple[bytes, float], ...], tuple[NDArray[np.intp], Floats, Floats | None]] = {}
-    for node, conditions in rows.items():
-        # Most nodes of a surface are held alike.
-        key = tuple((direction.tobytes(), wanted) for direction, wanted, _ in conditions)
-        if key not in known:
-            known[key] = _held(*_independent(conditions, mesh.points[node]))
-        axes, given, frame = known[key]
-        fixed[node, axes] = True
-        values[node, axes] = given
+    framed: list[Ints] = []
+    frames: list[Floats] = []
+    for nodes, conditions in conditions_at_nodes(mesh, supports, section):
+        axes, given, frame = _held(*_independent(conditions, mesh.points[nodes[0]]))
+        fixed[nodes[:, None], axes] = True
+        values[nodes[:, None], axes] = given
         if frame is not None:
-            nodes.append(node)
-            frames.append(frame)
+            framed.append(nodes)
+            frames.append(np.broadcast_to(frame, (len(nodes), *frame.shape)))
+    d = mesh.dimension
     return Constraints(
-        fixed, values, np.array(nodes, np.int32), np.array(frames).reshape(-1, mesh.dimension, mesh.dimension)
+        fixed,
+        values,
+        np.concatenate([np.empty(0, np.int32), *framed]),
+        np.concatenate([np.empty((0, d, d)), *frames]),
     )
 
 
@@ -126,27 +128,44 @@ def with_bodies(constraints: Constraints, bodies: Sequence[tuple[Floats, bool]])
 
 def conditions_at_nodes(
     mesh: Mesh, supports: Iterable[Clamped | Sliding | Prescribed], section: Section | None = None
-) -> dict[int, list[Condition]]:
-    """Return what holds each held node, in the order of the supports; last of all the axis of revolution.
+) -> list[tuple[Ints, list[Condition]]]:
+    """Return nodes ``(k,)`` that are held alike and by what, in the order of the supports; last of all the axis.
 
     Raises
     ------
     InputError
         If a displacement leaves the plane.
     """
-    rows: dict[int, list[Condition]] = {}
-    for support in supports:
-        for node, direction, value in _conditions(mesh, support):
-            rows.setdefault(node, []).append((direction, value, support.surface))
-    for node in on_axis(mesh, section):
-        rows.setdefault(int(node), []).append((np.array([1.0, 0.0]), 0.0, "axis"))
-    return rows
+    held = [
+        (nodes, (direction, value, support.surface))
+        for support in supports
+        for nodes, direction, value in _conditions(mesh, support)
+    ]
+    if len(nodes := on_axis(mesh, section)):
+        held.append((nodes, (np.array([1.0, 0.0]), 0.0, "axis")))
+    return [(alike, [held[k][1] for k in conditions]) for alike, conditions in _alike([nodes for nodes, _ in held])]
 
 
-def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[int, Floats, float]]:
+def _alike(groups: Sequence[Ints]) -> Iterable[tuple[Ints, list[int]]]:
+    """Yield the nodes that lie in the same ones of some groups of nodes, and the numbers of these groups, ascending."""
+    if not groups:
+        return
+    node = np.concatenate(groups)
+    group = np.repeat(np.arange(len(groups)), [len(nodes) for nodes in groups])
+    found, row, count = np.unique(node, return_inverse=True, return_counts=True)
+    order = np.argsort(row, kind="stable")
+    lists = np.full((len(found), count.max()), -1)
+    lists[row[order], np.arange(len(node)) - np.repeat(np.cumsum(count) - count, count)] = group[order]
+    kinds, kind, size = np.unique(lists, axis=0, return_inverse=True, return_counts=True)
+    members = np.split(found[np.argsort(kind.ravel(), kind="stable")], np.cumsum(size)[:-1])
+    for nodes, numbers in zip(members, kinds, strict=True):
+        yield nodes.astype(np.int32), numbers[numbers >= 0].tolist()
+
+
+def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable[tuple[Ints, Floats, float]]:
     if isinstance(support, Sliding):
-        for node, normal in _node_normals(mesh.points, mesh.surface(support.surface)):
-            yield node, normal, 0.0
+        for nodes, normal in _node_normals(mesh.points, mesh.surface(support.surface)):
+            yield nodes, normal, 0.0
         return
     d = mesh.dimension
     given = (0.0,) * d if isinstance(support, Clamped) else support.displacement
@@ -155,15 +174,23 @@ def _conditions(mesh: Mesh, support: Clamped | Sliding | Prescribed) -> Iterable
         raise InputError(
             "the displacement does not fit the model", key=f"supports.{support.surface}", value=given, expected=expected
         )
-    for node in mesh.surface_nodes(support.surface):
-        for axis, component in zip(np.eye(d), given[:d], strict=True):
-            if component is not None:
-                yield int(node), axis, component
+    nodes = mesh.surface_nodes(support.surface)
+    for axis, component in zip(np.eye(d), given[:d], strict=True):
+        if component is not None:
+            yield nodes, axis, component
 
 
-def _node_normals(points: Floats, faces: Ints) -> Iterable[tuple[int, Floats]]:
-    # Area-weighted mean normal at each node; where faces meet at a crease, one for each side of it.
+def _node_normals(points: Floats, faces: Ints) -> Iterable[tuple[Ints, Floats]]:
+    """Yield unit normals ``(d,)`` with the nodes that have them: the faces' mean at each node, weighted by area.
+
+    Where faces meet at a crease, a node has one for each side of it.
+    """
     face_normal = face_normals(points, faces).sum(axis=1)
+    largest = face_normal[np.argmax(np.linalg.norm(face_normal, axis=1))]
+    common = _unit(largest)
+    if np.abs(face_normal - (face_normal @ common)[:, None] * common).max() <= FLAT * np.linalg.norm(largest):
+        yield np.unique(faces), common
+        return
     groups: dict[int, list[Floats]] = {}
     for face, normal in zip(faces, face_normal, strict=True):
         for node in face:
@@ -176,9 +203,13 @@ def _node_normals(points: Floats, faces: Ints) -> Iterable[tuple[int, Floats]]:
                 here.append(normal)
     for node, normals in groups.items():
         for normal in normals:
-            unit = normal / np.linalg.norm(normal)
-            # A flat face that looks along an axis is to say so exactly.
-            yield node, np.where(np.abs(unit) < 1e-9, 0.0, unit)
+            yield np.array([node], np.int32), _unit(normal)
+
+
+def _unit(normal: Floats) -> Floats:
+    unit = normal / np.linalg.norm(normal)
+    # A flat face that looks along an axis is to say so exactly.
+    return np.asarray(np.where(np.abs(unit) < FLAT, 0.0, unit))
 
 
 def _independent(conditions: list[Condition], place: Floats) -> tuple[Floats, Floats]:

@@ -73,19 +73,15 @@ class Reactions:
 
 def _shares(system: System) -> list[tuple[str, Ints, Floats]]:
     """Return of each surface nodes ``(k,)`` and what it carries of the force there, a matrix for each ``(k, d, d)``."""
-    found: dict[str, tuple[list[int], list[Floats]]] = {}
-    known: dict[tuple[tuple[bytes, str], ...], dict[str, Floats]] = {}
-    for node, conditions in conditions_at_nodes(system.mesh, system.held, system.section).items():
-        key = tuple((direction.tobytes(), surface) for direction, _, surface in conditions)
-        if key not in known:
-            known[key] = _split(conditions)
-        for name, share in known[key].items():
-            nodes, matrices = found.setdefault(name, ([], []))
-            nodes.append(node)
-            matrices.append(share)
+    found: dict[str, list[tuple[Ints, Floats]]] = {}
+    for nodes, conditions in conditions_at_nodes(system.mesh, system.held, system.section):
+        for name, share in _split(conditions).items():
+            found.setdefault(name, []).append((nodes, np.broadcast_to(share, (len(nodes), *share.shape))))
     held = {support.surface for support in system.held}
     return [
-        (name, np.array(nodes, np.int32), np.array(shares)) for name, (nodes, shares) in found.items() if name in held
+        (name, np.concatenate([nodes for nodes, _ in parts]), np.concatenate([shares for _, shares in parts]))
+        for name, parts in found.items()
+        if name in held
     ]
 
 
