@@ -98,6 +98,13 @@ ENOUGH = 0.25
 Points may then go to and fro over a groove between two faces, which the tangent on neither side knows of.
 """
 
+RISE_ALLOWED = 2.0
+SHORT = 1 / 32
+"""Where no surfaces press on each other, the merit may rise by so many times what a short part of the step promises.
+
+Bent walls overshoot on their way, and Newton's method needs its long steps. What leads astray raises it by far more.
+"""
+
 ROUNDING = 1e-9
 """Part of the merit by which it may rise through rounding."""
 
@@ -184,8 +191,8 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
     """Return the state after the step and the part of it that was taken.
 
     It is shortened where surfaces would pass into each other too far, where it would turn an element inside out,
-    and, where surfaces may touch and a search is allowed, until the merit falls. What lags takes the values of
-    the full step all the same: they are the solution of the linear problem, not something to be approached.
+    and, where a search is allowed, by the merit. What lags takes the values of the full step all the same: they are
+    the solution of the linear problem, not something to be approached.
     """
     du = step.du
     lagged = system.advanced(state, du, step.base, step.unmet).lagged
@@ -194,7 +201,7 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
     while damping >= smallest:
         worst, _ = system.worst_jacobian(state.u + damping * du)
         if worst > 0.0:
-            if search and system.contacts and step.base is None:
+            if search and step.base is None:
                 damping = _searched(system, state, du, lagged, damping)
             return replace(state, u=state.u + damping * du, lagged=lagged), damping
         damping *= 0.5
@@ -207,13 +214,42 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
 
 
 def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float) -> float:
+    """Return the part of the step to take: all of it unless the merit rises, and often even then."""
+    start = system.merit(state, lagged)
+    full = system.merit(state.moved(longest * du), lagged)
+    if any(system.contact_force(at) > 0.0 for at in (state, state.moved(longest * du))):
+        return _until_it_falls(system, state, du, lagged, longest, start, full)
+    if full <= start:
+        return longest
+    return _until_it_rises_little(system, state, du, lagged, longest, start, full)
+
+
+def _until_it_rises_little(
+    system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float, start: float, full: float
+) -> float:
+    """Return the longest of ever shorter parts of the step with which the merit rises no more than it may.
+
+    If it rises from the beginning, the tangent is not definite: the step leads to an unstable state, or astray.
+    """
+    promised = 0.5 * (start - system.merit(state.moved(SHORT * longest * du), lagged)) / SHORT
+    if promised <= 0.0:
+        return longest
+    part, merit = longest, full
+    while merit - start > RISE_ALLOWED * promised and part > SHORT * longest:
+        part *= 0.5
+        merit = system.merit(state.moved(part * du), lagged)
+    return part
+
+
+def _until_it_falls(
+    system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float, start: float, full: float
+) -> float:
     """Return the longest of a few ever shorter parts of the step with which the merit falls enough, or else the best.
 
     With a barrier it is the longest too where the forces are less out of balance after it.
     """
-    start = system.merit(state, lagged)
     rounding = ROUNDING * abs(start)
-    parts, merits = [longest], [system.merit(state.moved(longest * du), lagged)]
+    parts, merits = [longest], [full]
     while len(parts) < TRIALS:
         parts.append(0.5 * parts[-1])
         merits.append(system.merit(state.moved(parts[-1] * du), lagged))

@@ -39,7 +39,10 @@ SAME = 1e-6
 NOWHERE = -1
 
 
-def balls(x: Floats, faces: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+Balls = tuple[Floats, Floats, Floats, Floats]
+
+
+def balls(x: Floats, faces: Ints) -> Balls:
     """Return centre ``(k, 3)``, unit normal ``(k, 3)`` and radius ``(k,)`` of balls that the faces lie in.
 
     And how far at most a face leaves the plane through the centre across the normal, ``(k,)``.
@@ -69,6 +72,32 @@ def _fill_balls(x, faces, control, centre, normal, radius, rise):  # type: ignor
             square = max(square, dot(away, away))
             highest = max(highest, abs(dot(away, normal[f])))
         radius[f], rise[f] = np.sqrt(square), highest
+
+
+@jit
+def _nearest_first(f, centre, flat, radius, rise, candidates, depth, margin, reach, near, ahead):  # type: ignore[no-untyped-def]
+    """Write the candidates of a face whose slabs it reaches, the nearest first, and how far it is from them at least.
+
+    Return how many there are.
+    """
+    count = 0
+    for m in candidates:
+        height = square = 0.0
+        for i in range(3):
+            away = centre[f, i] - centre[m, i]
+            height += away * flat[m, i]
+            square += away * away
+        extent = rise[m] + radius[f] + margin
+        if height > extent + reach or -height > extent + min(depth[f], depth[m]):
+            continue
+        distance = np.sqrt(square) - radius[f] - radius[m] - margin
+        at = count
+        while at > 0 and ahead[at - 1] > distance:
+            near[at], ahead[at] = near[at - 1], ahead[at - 1]
+            at -= 1
+        near[at], ahead[at] = m, distance
+        count += 1
+    return count
 
 
 @parallel
@@ -103,17 +132,22 @@ def find_partners(  # type: ignore[no-untyped-def]
         N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
         point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
         away, rim_place, rim_local = np.empty(3), np.empty(3), np.empty(2)
+        here = candidates[start[f] : start[f + 1]]
+        near, ahead = np.empty(len(here), np.int32), np.empty(len(here))
+        count = _nearest_first(f, centre, flat, radius, rise, here, depth, margin, reach, near, ahead)
         for q in range(len(rule)):
             partner[f, q] = NOWHERE
             gap[f, q] = np.inf
-            if start[f] == start[f + 1]:
+            if count == 0:
                 continue
             rim_gap, rim_face, sharing = np.inf, NOWHERE, 0
             shape_functions(rule[q, 0], rule[q, 1], N, D)
             surface_frame(x, faces[f], N, D, point, tangent, outward)
             point += margin * outward
-            for c in range(start[f], start[f + 1]):
-                m = candidates[c]
+            for c in range(count):
+                m = near[c]
+                if ahead[c] > abs(gap[f, q]):
+                    break
                 deepest = min(depth[f], depth[m])
                 away[:] = point - centre[m]
                 height, far = dot(away, flat[m]), radius[m] + min(max(reach, deepest), abs(gap[f, q]))

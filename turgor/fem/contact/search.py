@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem.contact.closest import dot
-from turgor.fem.contact.pairs import FACING, balls
+from turgor.fem.contact.pairs import FACING, Balls, balls
 from turgor.fem.contact.skin import Skin
 from turgor.fem.kernels import jit, parallel
 
@@ -26,6 +26,10 @@ CORNER = 0.2
 
 DEEPEST = 128
 """Boxes that may wait to be looked into; a tree that halves has far fewer."""
+
+
+ROOM = 16
+"""Candidates of a face for which there is room at first."""
 
 
 class Search:
@@ -51,15 +55,16 @@ class Search:
         centre, normal, _ = self._rest
         # Faces that look the same way are put together, as if a right angle between them were this long a way.
         apart = 0.5 * float(np.linalg.norm(np.ptp(centre, axis=0)))
+        self._room = ROOM
         self._links, self._order = _tree(np.hstack([centre, apart * normal]))
 
-    def candidates(self, x: Floats, reach: float) -> tuple[Indices, Ints]:
-        """Return for each face the faces that its points may overlap, or meet within `reach`, at positions `x`.
+    def candidates(self, around: Balls, reach: float) -> tuple[Indices, Ints]:
+        """Return for each face the faces that its points may overlap, or meet within `reach`.
 
         Parameters
         ----------
-        x
-            Positions of all nodes, ``(n_points, 3)``, mm.
+        around
+            Balls around all faces where they are.
         reach
             In mm.
 
@@ -69,22 +74,24 @@ class Search:
             In compressed rows: the candidates of face ``f`` are ``candidates[start[f]:start[f + 1]]``.
         """
         skin, k = self.skin, len(self.skin.faces)
-        start = np.zeros(k + 1, np.int64)
-        if not np.isfinite(x).all():
+        centre, normal, radius, _ = around
+        if not np.isfinite(centre).all():
             # The iteration has gone astray, which is for the solver to say.
-            return start, np.empty(0, np.int32)
-        centre, normal, radius, _ = balls(x, skin.faces)
+            return np.zeros(k + 1, np.int64), np.empty(0, np.int32)
         boxes = np.empty((len(self._links), 2, 6))
         _fit(centre, normal, radius, self._links, self._order, boxes)
         corners = np.ascontiguousarray(skin.faces[:, : skin.cell.n_corners])
         now = (centre, normal, radius, skin.depth, reach)
         always = (corners, self._group, *self._rest, skin.wall, skin.part)
-        tree = (boxes, self._links, self._order)
-        _search(*now, *always, *tree, False, start, np.empty(0, np.int32))
-        np.cumsum(start, out=start)
-        found = np.empty(start[-1], np.int32)
-        _search(*now, *always, *tree, True, start, found)
-        return start, found
+        count = np.empty(k, np.int64)
+        while True:
+            found = np.empty((k, self._room), np.int32)
+            _search(*now, *always, boxes, self._links, self._order, count, found)
+            if (most := int(count.max(initial=0))) <= self._room:
+                break
+            self._room = 2 * most
+        start = np.concatenate([[0], np.cumsum(count)])
+        return start, found[np.arange(self._room) < count[:, None]]
 
 
 def _tree(places: Floats) -> tuple[Indices, Indices]:
@@ -195,14 +202,14 @@ def _search(  # type: ignore[no-untyped-def]
     boxes,
     links,
     order,
-    fill,
-    start,
+    count,
     found,
 ):
-    """Count the candidates of each face into ``start[f + 1]``, or, with `fill`, write them from ``start[f]`` on."""
+    """Write how many candidates each face has, ``count (k,)``, and the first of them, ``found (k, room)``."""
+    room = found.shape[1]
     for f in nb.prange(len(centre)):
         waiting = np.empty(DEEPEST, np.int64)
-        waiting[0], left, count = 0, 1, 0
+        waiting[0], left, here = 0, 1, 0
         while left > 0:
             left -= 1
             b = waiting[left]
@@ -226,8 +233,7 @@ def _search(  # type: ignore[no-untyped-def]
                         continue
                 elif part[f] == part[m] and _one_wall(f, m, rest_centre, rest_normal, rest_radius, wall):
                     continue
-                if fill:
-                    found[start[f] + count] = m
-                count += 1
-        if not fill:
-            start[f + 1] = count
+                if here < room:
+                    found[f, here] = m
+                here += 1
+        count[f] = here

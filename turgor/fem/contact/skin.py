@@ -64,6 +64,8 @@ class Skin:
         Places of all nodes at rest, ``(n_points, 3)``: those of a plane mesh lie at z = 0.
     rule
         Local coordinates of the quadrature points, ``(q, 2)``.
+    few
+        Those of the fewer points from which a step is looked ahead.
     shape
         Shape functions there, ``(q, n)``.
     area
@@ -94,7 +96,7 @@ class Skin:
         self.dimension = mesh.dimension
         self.points = np.array(in_space(mesh.points), order="C")
         self.faces = np.ascontiguousarray(faces, dtype=np.int32)
-        self.rule = np.ascontiguousarray(np.pad(cell.points, ((0, 0), (0, 2 - cell.dimension))))
+        self.rule, self.few = (_in_the_plane(points) for points in (cell.points, face_cell(faces).points))
         self.shape = cell.shape_at_quadrature
         nodes = mesh.points[self.faces]
         self.area = _measures(nodes, cell) * cell.weights * depth(section, cell.shape_at_quadrature @ nodes)
@@ -174,6 +176,10 @@ def _contact_cell(faces: Ints) -> Cell:
         part, places = _four_point_rule(), [(0.0, 0.0, 0.5), (0.5, 0.0, 0.5), (0.0, 0.5, 0.5), (0.5, 0.5, 0.5)]
     points = np.vstack([np.array([a, b]) + size * part.points for a, b, size in places])
     return replace(cell, rule=Rule(points, np.tile(part.weights / 4, 4)))
+
+
+def _in_the_plane(points: Floats) -> Floats:
+    return np.ascontiguousarray(np.pad(points, ((0, 0), (0, 2 - points.shape[1]))))
 
 
 def _four_point_rule() -> Rule:

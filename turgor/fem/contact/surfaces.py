@@ -128,7 +128,7 @@ class SurfaceContact:
     def couplings(self, u: Floats) -> Ints:
         """Return the nodes of all pairs of faces near each other, of which one meets something soon."""
         skin, x = self.skin, self.skin.space(u)
-        start, second = self._search.candidates(x, SOON * skin.size)
+        start, second = self._search.candidates(balls(x, skin.faces), SOON * skin.size)
         pairs = self._pairs(x, SOON * skin.size)
         awake = np.zeros(len(skin.faces), bool)
         awake[pairs.face] = awake[pairs.masters] = True
@@ -150,12 +150,12 @@ class SurfaceContact:
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much to be seen.
 
-        First by the rates of the gaps, for all pairs in reach; then by looking, for pairs that were not in
-        sight, or turned on the way.
+        First by the rates of the gaps, from a few points of each face to all that is in reach; then by looking, for
+        pairs that were not in sight, or turned on the way.
         """
         # A gap closes by no more than both sides move; between nodes a field may be larger than at them.
         reach = min(REACH * self.skin.size, 4.0 * float(np.sqrt((du**2).sum(axis=1)).max()))
-        pairs = self._pairs(self.skin.space(state.u), reach)
+        pairs = self._pairs(self.skin.space(state.u), reach, rule=self.skin.few)
         growth = GROWTH_OF_OVERLAP * self._depth(pairs)
         rate = self._rates(state.u, pairs, du)
         closing = rate < 0.0
@@ -224,16 +224,19 @@ class SurfaceContact:
         pairs = self._pairs(self.skin.space(u), 0.0, margin)
         return pairs.where(pairs.overlap < 0.0)
 
-    def _pairs(self, x: Floats, reach: float, margin: float = 0.0) -> Pairs:
+    def _pairs(self, x: Floats, reach: float, margin: float = 0.0, rule: Floats | None = None) -> Pairs:
+        """Return the pairs whose gap is up to `reach`, of the quadrature points or of those of another `rule`."""
         skin = self.skin
-        shape = skin.area.shape
+        rule = skin.rule if rule is None else rule
+        shape = (len(skin.faces), len(rule))
         partner, local, gap = np.empty(shape, np.int32), np.empty((*shape, 2)), np.empty(shape)
-        start, candidates = self._search.candidates(x, reach)
+        around = balls(x, skin.faces)
+        start, candidates = self._search.candidates(around, reach)
         where = (start, candidates, skin.depth, margin, reach)
-        find_partners(x, skin.faces, *balls(x, skin.faces), skin.rule, *where, partner, local, gap)
+        find_partners(x, skin.faces, *around, rule, *where, partner, local, gap)
         face, quad = np.nonzero(partner != NOWHERE)
         overlap = gap[face, quad]
-        return Pairs(face, quad, partner[face, quad], skin.rule[quad], local[face, quad], overlap + margin, overlap)
+        return Pairs(face, quad, partner[face, quad], rule[quad], local[face, quad], overlap + margin, overlap)
 
     def _nodes(self, pairs: Pairs) -> Ints:
         return np.hstack([self.skin.faces[pairs.face], self.skin.faces[pairs.masters]])
