@@ -38,8 +38,8 @@ class Sheet(Solid):
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""
         self._deform(state.u)
-        density = self._law()[0].reshape(self.dV.shape) + self.material.volumetric.energy(self._now.J)
-        return float(np.sum(density * self.dV))
+        self._respond()
+        return float(np.vdot(self._now.density + self.material.volumetric.energy(self._now.J), self.dV))
 
     def merit(self, state: State, lagged: Floats) -> float:
         """Return the strain energy, N mm: nothing lags."""

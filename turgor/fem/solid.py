@@ -26,14 +26,15 @@ AUGMENTATION = 10.0
 class _Configuration:
     """Deformation and response of a region at one displacement: both are asked for again and again.
 
-    ``F (m, q, 3, 3)``, its determinant ``J (m, q)``, the coefficients of θ ``dilatation (m, k)``, isochoric Kirchhoff
-    stress ``tau (m, q, 6)`` and its spatial ``tangent (m, q, 21)``, what lags.
+    ``F (m, q, 3, 3)``, its determinant ``J (m, q)``, the coefficients of θ ``dilatation (m, k)``, isochoric energy
+    ``density (m, q)``, Kirchhoff stress ``tau (m, q, 6)`` and its spatial ``tangent (m, q, 21)``, what lags.
     """
 
     def __init__(self, m: int, q: int, k: int) -> None:
         self.F = np.empty((m, q, 3, 3))
         self.J = np.empty((m, q))
         self.dilatation = np.empty((m, k))
+        self.density = np.empty((m, q))
         self.tau = np.empty((m, q, 6))
         self.tangent = np.empty((m, q, TANGENT_SIZE))
         self.forget()
@@ -146,9 +147,9 @@ class Solid(Mixed):
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""
         self._deform(state.u)
-        density = self._law()[0].reshape(self.dV.shape)
+        self._respond()
         volumetric = self.material.volumetric.energy(self._at_points(self._now.dilatation))
-        return float(np.sum((density + volumetric) * self.dV))
+        return float(np.vdot(self._now.density + volumetric, self.dV))
 
     def merit(self, state: State, lagged: Floats) -> float:
         """Return the energy with its volumetric part linearised at the lagged θ, N mm.
@@ -156,12 +157,12 @@ class Solid(Mixed):
         An augmented Lagrangian: a small multiple of the squared deviation from them keeps it bounded below.
         """
         self._deform(state.u)
-        density = self._law()[0].reshape(self.dV.shape)
+        self._respond()
         law, expected = self.material.volumetric, self._at_points(self._lagged_dilatation(lagged))
         deviation = self._at_points(self._now.dilatation) - expected
         bulk = AUGMENTATION * self.material.shear_modulus
         volumetric = law.energy(expected) + law.pressure(expected) * deviation + 0.5 * bulk * deviation**2
-        return float(np.sum((density + volumetric) * self.dV))
+        return float(np.vdot(self._now.density + volumetric, self.dV))
 
     def force(self, state: State, out: Floats) -> None:
         """Add the internal forces, N."""
@@ -306,7 +307,7 @@ class Solid(Mixed):
             self._now.u = u.copy()
 
     def _respond(self) -> None:
-        """Bring isochoric Kirchhoff stress and tangent to the deformation, unless they are there."""
+        """Bring isochoric energy, Kirchhoff stress and tangent to the deformation, unless they are there."""
         if not self._now.has_responded:
             self._find_response()
             self._now.has_responded = True
@@ -330,8 +331,9 @@ class Solid(Mixed):
         F, J = self._now.F.reshape(-1, 3, 3), self._now.J.ravel()
         tau, tangent = self._now.tau.reshape(-1, 6), self._now.tangent.reshape(-1, TANGENT_SIZE)
         if isinstance(self.material, InvariantModel):
-            _, *derivatives = self._law()
+            density, *derivatives = self._law()
             constitutive.invariant_response(F, J, *derivatives, tau, tangent)
         else:
-            _, dW, d2W, stretches, directions = self._law()
+            density, dW, d2W, stretches, directions = self._law()
             constitutive.stretch_response(stretches, directions, dW, d2W, tau, tangent)
+        self._now.density[:] = density.reshape(self.dV.shape)

@@ -229,13 +229,14 @@ def _until_it_rises_little(
 ) -> float:
     """Return the longest of ever shorter parts of the step with which the merit rises no more than it may.
 
-    If it rises from the beginning, the tangent is not definite: the step leads to an unstable state, or astray.
+    If it rises from the beginning, the step leads to an unstable state, or so far astray that the next one will tell.
     """
     promised = 0.5 * (start - system.merit(state.moved(SHORT * longest * du), lagged)) / SHORT
-    if promised <= 0.0:
+    if not promised > 0.0:
         return longest
     part, merit = longest, full
-    while merit - start > RISE_ALLOWED * promised and part > SHORT * longest:
+    # Written so that what is not a number is too much.
+    while not merit - start <= RISE_ALLOWED * promised and part > SHORT * longest:
         part *= 0.5
         merit = system.merit(state.moved(part * du), lagged)
     return part
