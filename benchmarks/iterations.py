@@ -1,26 +1,29 @@
 """Factorisations on the way to the loads of several actuators, and the iterations made with them.
 
-    .venv/bin/python benchmarks/iterations.py [--kept-from 0]
+    .venv/bin/python benchmarks/iterations.py [--kept-from 0] [--contact]
 
 Prints the rows of the table in docs/theory/formulation.md: the factorisations and the iterations of each state, those
-of attempts that failed on the way left out. With PYTHONPATH at the checkout of another commit it counts that one's.
+of attempts that failed on the way left out. With `--contact`, the iterations of the boxes in docs/theory/contact.md,
+each one factorisation. With PYTHONPATH at the checkout of another commit it counts that one's.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import turgor as tg
-from turgor.fem.loads import Force
+from turgor.fem.contact.spec import SelfContact
+from turgor.fem.loads import Force, Pressure
 from turgor.fem.section import PlaneStrain
-from turgor.fem.supports import Clamped
+from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.materials.models.neo_hookean import NeoHookean
 from turgor.materials.volumetric import Quadratic
 from turgor.mesh.structured import rectangle
 from turgor.solver import tangent
-from turgor.solver.path import solve_path
+from turgor.solver.path import output_fractions, solve_path
 from turgor.study.build import system_of
 from turgor.study.materials import build_materials
 
@@ -59,13 +62,48 @@ def actuator(name: str, changes: list[str]) -> System:
     return system_of(case, tg.mesh_case(case), materials)
 
 
+def chambers(pressure: float, method: str | None) -> System:
+    """Return two boxes 1 mm apart under `pressure`, MPa: halves of them, as in tests/analytic/test_contact.py."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from contact_bodies import half_chamber, merged, shifted_mesh
+
+    one = half_chamber((12.0, 6.0, 12.0), (6, 3, 6))
+    mesh = merged(left=one, right=shifted_mesh(one, 13.0))
+    supports = [Clamped("left-z0"), Clamped("right-z0"), Sliding("left-y0"), Sliding("right-y0")]
+    loads = [Pressure("left-cavity", pressure), Pressure("right-cavity", pressure)]
+    rubber = NeoHookean(C10=0.05, volumetric=Quadratic(100.0))
+    return System(mesh, {"body": rubber}, supports, loads, contact=[SelfContact(method=method)] if method else [])
+
+
+def print_boxes() -> None:
+    """Print a row a pressure: iterations without contact, by penalty and by barrier, in 1, 4 and 10 steps."""
+    tangent.KEPT_FROM = sys.maxsize
+    print("| pressure, steps | without contact | penalty | overlap | barrier | gap |\n|---|---|---|---|---|---|")
+    for pressure in (20, 30, 40):
+        counted, last = [], {}
+        for method in (None, "penalty", "barrier"):
+            system = chambers(1e-3 * pressure, method)
+            ends = [solve_path(system, output_fractions(steps)) for steps in (1, 4, 10)]
+            counted.append(" / ".join(str(sum(found.iterations for found in path)) for path in ends))
+            last[method] = system.touches(ends[-1][-1].state)
+        (touch,), (near,) = last["penalty"], last["barrier"]
+        overlap = f"{touch.overlap:.3f} mm, {100 * touch.overlap_per_wall:.2f} % of the wall"
+        row = (f"{pressure} kPa, 1 / 4 / 10", counted[0], counted[1], overlap, counted[2], f"{near.gap:.3f} mm")
+        print(f"| {' | '.join(row)} |", flush=True)
+
+
 def main() -> None:
     """Print one row a case."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--kept-from", type=int, default=tangent.KEPT_FROM, help="unknowns in space from which tangents serve again"
     )
-    tangent.KEPT_FROM = parser.parse_args().kept_from
+    parser.add_argument("--contact", action="store_true", help="count those of two boxes that touch")
+    asked = parser.parse_args()
+    if asked.contact:
+        print_boxes()
+        return
+    tangent.KEPT_FROM = asked.kept_from
     print("| case | factorisations (iterations) |\n|---|---|")
     ends = [counts(strip(strength), [1.0]) for strength in (1.0, 5.0, 10.0)]
     print(f"| elastica, end force 1, 5, 10 EI/L², in one step | {', '.join(ends)} |")
