@@ -189,14 +189,24 @@ def contact_normal(point, position, local, tangent, n_nodes, normal):  # type: i
 
 
 @jit
+def invert(matrix, inverse):  # type: ignore[no-untyped-def]
+    """Write the inverse of a ``matrix (2, 2)``."""
+    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+    inverse[0, 0], inverse[1, 1] = matrix[1, 1] / determinant, matrix[0, 0] / determinant
+    inverse[0, 1], inverse[1, 0] = -matrix[0, 1] / determinant, -matrix[1, 0] / determinant
+
+
+@jit
 def free_inverse(n_nodes, local, matrix, inverse):  # type: ignore[no-untyped-def]
     """Write the inverse of a symmetric ``matrix (2, 2)`` among the ways that a local point can move within the face."""
     free = np.empty((2, 2))
     count = free_directions(n_nodes, local, free)
     inverse[:] = 0.0
     if count == 2:
-        inverse[:] = np.linalg.inv(matrix)
+        invert(matrix, inverse)
     elif count == 1:
         way = free[0]
         stiffness = way[0] * (matrix[0, 0] * way[0] + 2.0 * matrix[0, 1] * way[1]) + matrix[1, 1] * way[1] ** 2
-        inverse[:] = np.outer(way, way) / stiffness
+        for i in range(2):
+            for k in range(2):
+                inverse[i, k] = way[i] * way[k] / stiffness

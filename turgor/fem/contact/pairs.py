@@ -16,7 +16,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.contact.closest import contact_normal, dot, free_inverse, gap_to, surface_frame
+from turgor.fem.contact.closest import contact_normal, dot, free_inverse, gap_to, invert, surface_frame
 from turgor.fem.contact.shapes import (
     control_weights,
     middle,
@@ -58,20 +58,26 @@ _CONTROL = {CELLS[name].n_nodes: control_weights(CELLS[name]) for name in ("line
 
 @parallel
 def _fill_balls(x, faces, control, centre, normal, radius, rise):  # type: ignore[no-untyped-def]
-    n = faces.shape[1]
     for f in nb.prange(len(faces)):
-        N, D, tangent, away = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
-        shape_functions(middle(n), middle(n), N, D)
-        surface_frame(x, faces[f], N, D, centre[f], tangent, normal[f])
-        square = highest = 0.0
-        for p in range(n):
-            away[:] = -centre[f]
-            for a in range(n):
-                for i in range(3):
-                    away[i] += control[p, a] * x[faces[f, a], i]
-            square = max(square, dot(away, away))
-            highest = max(highest, abs(dot(away, normal[f])))
-        radius[f], rise[f] = np.sqrt(square), highest
+        radius[f], rise[f] = _ball(x, faces[f], control, centre[f], normal[f])
+
+
+@jit
+def _ball(x, face, control, centre, normal):  # type: ignore[no-untyped-def]
+    """Write centre and normal of a face; return the radius of the ball around it and how far it rises at most."""
+    n = len(face)
+    N, D, tangent, away = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
+    shape_functions(middle(n), middle(n), N, D)
+    surface_frame(x, face, N, D, centre, tangent, normal)
+    square = highest = 0.0
+    for p in range(n):
+        away[:] = -centre
+        for a in range(n):
+            for i in range(3):
+                away[i] += control[p, a] * x[face[a], i]
+        square = max(square, dot(away, away))
+        highest = max(highest, abs(dot(away, normal)))
+    return np.sqrt(square), highest
 
 
 @jit
@@ -127,45 +133,51 @@ def find_partners(  # type: ignore[no-untyped-def]
         Results: the master ``(k, q)`` (:data:`NOWHERE` if there is none), the closest point ``(k, q, 2)``, the gap
         ``(k, q)``.
     """
-    n = faces.shape[1]
     for f in nb.prange(len(faces)):
-        N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
-        point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
-        away, rim_place, rim_local = np.empty(3), np.empty(3), np.empty(2)
         here = candidates[start[f] : start[f + 1]]
         near, ahead = np.empty(len(here), np.int32), np.empty(len(here))
         count = _nearest_first(f, centre, flat, radius, rise, here, depth, margin, reach, near, ahead)
-        for q in range(len(rule)):
-            partner[f, q] = NOWHERE
-            gap[f, q] = np.inf
-            if count == 0:
+        around = (centre, flat, radius, rise, rule)
+        _partners_of(f, x, faces, *around, near, ahead, count, depth, margin, reach, partner[f], local[f], gap[f])
+
+
+@jit
+def _partners_of(  # type: ignore[no-untyped-def]
+    f, x, faces, centre, flat, radius, rise, rule, near, ahead, count, depth, margin, reach, partner, local, gap
+):
+    """Find the partners of the points of one face among `count` faces `near`, from which it is `ahead` at least."""
+    n = faces.shape[1]
+    N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
+    point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
+    away, rim_place, rim_local = np.empty(3), np.empty(3), np.empty(2)
+    partner[:], gap[:] = NOWHERE, np.inf
+    for q in range(len(rule) if count > 0 else 0):
+        rim_gap, rim_face, sharing = np.inf, NOWHERE, 0
+        shape_functions(rule[q, 0], rule[q, 1], N, D)
+        surface_frame(x, faces[f], N, D, point, tangent, outward)
+        point += margin * outward
+        for c in range(count):
+            m = near[c]
+            if ahead[c] > abs(gap[q]):
+                break
+            deepest = min(depth[f], depth[m])
+            away[:] = point - centre[m]
+            height, far = dot(away, flat[m]), radius[m] + min(max(reach, deepest), abs(gap[q]))
+            if dot(away, away) > far * far or height > rise[m] + reach or -height > rise[m] + deepest:
                 continue
-            rim_gap, rim_face, sharing = np.inf, NOWHERE, 0
-            shape_functions(rule[q, 0], rule[q, 1], N, D)
-            surface_frame(x, faces[f], N, D, point, tangent, outward)
-            point += margin * outward
-            for c in range(count):
-                m = near[c]
-                if ahead[c] > abs(gap[f, q]):
-                    break
-                deepest = min(depth[f], depth[m])
-                away[:] = point - centre[m]
-                height, far = dot(away, flat[m]), radius[m] + min(max(reach, deepest), abs(gap[f, q]))
-                if dot(away, away) > far * far or height > rise[m] + reach or -height > rise[m] + deepest:
-                    continue
-                g = gap_to(x, faces[m], point, trial, N, D, second, position, tangent, normal)
-                if g < -deepest or g > reach or dot(outward, normal) > FACING:
-                    continue
-                rim = on_rim(n, trial)
-                if not rim and abs(g) < abs(gap[f, q]):
-                    partner[f, q], gap[f, q], local[f, q] = m, g, trial
-                elif rim and np.abs(position - rim_place).max() < SAME * radius[m] and rim_face != NOWHERE:
-                    sharing += 1
-                elif rim and abs(g) < abs(rim_gap):
-                    rim_face, rim_gap, sharing = m, g, 1
-                    rim_place[:], rim_local[:] = position, trial
-            if sharing > 1 and abs(rim_gap) < abs(gap[f, q]):
-                partner[f, q], gap[f, q], local[f, q] = rim_face, rim_gap, rim_local
+            g = gap_to(x, faces[m], point, trial, N, D, second, position, tangent, normal)
+            if g < -deepest or g > reach or dot(outward, normal) > FACING:
+                continue
+            rim = on_rim(n, trial)
+            if not rim and abs(g) < abs(gap[q]):
+                partner[q], gap[q], local[q] = m, g, trial
+            elif rim and np.abs(position - rim_place).max() < SAME * radius[m] and rim_face != NOWHERE:
+                sharing += 1
+            elif rim and abs(g) < abs(rim_gap):
+                rim_face, rim_gap, sharing = m, g, 1
+                rim_place[:], rim_local[:] = position, trial
+        if sharing > 1 and abs(rim_gap) < abs(gap[q]):
+            partner[q], gap[q], local[q] = rim_face, rim_gap, rim_local
 
 
 @parallel
@@ -175,14 +187,19 @@ def gap_gradients(x, slaves, masters, at, local, margin, gradient):  # type: ign
     `slaves` and `masters` are ``(n_pairs, n)``; `at` and `local` ``(n_pairs, 2)`` are the points on them. The closest
     point's own motion has no part in it, for the gap is normal to the master.
     """
-    n, d = slaves.shape[1], gradient.shape[2]
     for p in nb.prange(len(slaves)):
-        N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
-        own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
-        _pair_frame(x, slaves[p], masters[p], at[p], local[p], margin, N, D, own, outward, tangent, normal, apart)
-        for a in range(2 * n):
-            for i in range(d):
-                gradient[p, a, i] = dot(apart[a, i], normal)
+        _gradient_of(x, slaves[p], masters[p], at[p], local[p], margin, gradient[p])
+
+
+@jit
+def _gradient_of(x, slave, master, at, local, margin, gradient):  # type: ignore[no-untyped-def]
+    n, d = len(slave), gradient.shape[1]
+    N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
+    own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
+    _pair_frame(x, slave, master, at, local, margin, N, D, own, outward, tangent, normal, apart)
+    for a in range(2 * n):
+        for i in range(d):
+            gradient[a, i] = dot(apart[a, i], normal)
 
 
 @jit
@@ -195,11 +212,15 @@ def _pair_frame(  # type: ignore[no-untyped-def]
     tangents, `normal` the direction of contact, ``apart (2 n, d, 3)`` the derivatives of ``x − y`` by the nodes.
     """
     n, d = len(slave), apart.shape[1]
-    position = np.empty(3)
+    position, metric, inverse = np.empty(3), np.empty((2, 2)), np.empty((2, 2))
     shape_functions(at[0], at[1], N, D)
     surface_frame(x, slave, N, D, position, tangent, outward)
     point = position + margin * outward
-    own[:] = np.linalg.inv(tangent @ tangent.T) @ tangent
+    _inner_products(tangent, metric)
+    invert(metric, inverse)
+    for i in range(3):
+        for r in range(2):
+            own[r, i] = inverse[r, 0] * tangent[0, i] + inverse[r, 1] * tangent[1, i]
     apart[:] = 0.0
     for a in range(n):
         for i in range(d):
@@ -214,28 +235,46 @@ def _pair_frame(  # type: ignore[no-untyped-def]
 
 
 @jit
+def _inner_products(vectors, products):  # type: ignore[no-untyped-def]
+    """Write the scalar products of two ``vectors (2, 3)`` with each other, ``products (2, 2)``."""
+    for r in range(2):
+        for s in range(2):
+            products[r, s] = dot(vectors[r], vectors[s])
+
+
+@jit
+def _add_dyad(value, scale, left, right):  # type: ignore[no-untyped-def]
+    """Add ``scale · left ⊗ right`` to the upper triangle of `value`."""
+    for row in range(len(left)):
+        factor = scale * left[row]
+        for col in range(row, len(right)):
+            value[row, col] += factor * right[col]
+
+
+@jit
 def _add_coating(at, own, outward, normal, factor, N, D, value):  # type: ignore[no-untyped-def]
     """Add ``factor · n · δ²ν`` to ``value (rows, rows)``, ν the slave's normal: the margin is a coating along it.
 
-    With ``U_β = ν · δa_β`` and ``V_βγ = a^β · δa_γ`` (a the slave's tangents) it is ``δν = −a^β U_β`` and
-    ``n · δ²ν = 2 (n · a^γ) U_β V_βγ − (n · ν) m^βγ U_β U_γ``.
+    With ``U_β = ν · δa_β`` and ``V_β = (n · a^γ) a^β · δa_γ`` (a the slave's tangents) it is ``δν = −a^β U_β`` and
+    ``n · δ²ν = 2 U_β V_β − (n · ν) m^βγ U_β U_γ``.
     """
     n, rows = len(N), len(value)
     d = rows // (2 * n)
     shape_functions(at[0], at[1], N, D)
-    U, V = np.zeros((2, rows)), np.zeros((2, 2, rows))
+    U, V, metric = np.zeros((2, rows)), np.zeros((2, rows)), np.empty((2, 2))
+    along = (dot(normal, own[0]), dot(normal, own[1]))
     for a in range(n):
         for i in range(d):
             for b in range(2):
                 U[b, d * a + i] = outward[i] * D[a, b]
-                for c in range(2):
-                    V[b, c, d * a + i] = own[b, i] * D[a, c]
-    metric, facing = own @ own.T, dot(normal, outward)
+                V[b, d * a + i] = own[b, i] * (along[0] * D[a, 0] + along[1] * D[a, 1])
+    _inner_products(own, metric)
+    facing = dot(normal, outward)
     for b in range(2):
+        _add_dyad(value, factor, U[b], V[b])
+        _add_dyad(value, factor, V[b], U[b])
         for c in range(2):
-            mixed = np.outer(U[b], V[b, c])
-            value += factor * dot(normal, own[c]) * (mixed + mixed.T)
-            value -= factor * facing * metric[b, c] * np.outer(U[b], U[c])
+            _add_dyad(value, -factor * facing * metric[b, c], U[b], U[c])
 
 
 @parallel
@@ -253,44 +292,95 @@ def pair_stiffness(  # type: ignore[no-untyped-def]
     `gap` is measured from the coating of thickness `margin`; `normal_stiffness` k and `force` F (negative in
     compression, lagged) are ``(n_pairs,)``.
     """
-    n = slaves.shape[1]
-    rows = 2 * n * d
     for p in nb.prange(len(slaves)):
-        N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
-        own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
-        second, across = np.empty((n, 3)), np.zeros((3, 3))
-        m, b, A = np.empty((2, 2)), np.zeros((2, 2)), np.empty((2, 2))
-        inverse, inverse_metric = np.empty((2, 2)), np.empty((2, 2))
-        S = np.zeros((2, rows))
-        _pair_frame(x, slaves[p], masters[p], at[p], local[p], margin, N, D, own, outward, tangent, normal, apart)
-        second_derivatives(local[p, 0], local[p, 1], second)
-        for a in range(n):
-            height = dot(normal, x[masters[p, a]])
-            b[0, 0] += second[a, 0] * height
-            b[1, 1] += second[a, 1] * height
-            b[0, 1] += second[a, 2] * height
-            for i in range(d):
-                for r in range(2):
-                    S[r, d * (n + a) + i] = D[a, r] * normal[i]
-        b[1, 0] = b[0, 1]
+        pair = (slaves[p], masters[p], at[p], local[p])
+        _stiffness_of(x, *pair, margin, gap[p], normal_stiffness[p], force[p], d, packed[p])
+
+
+@jit
+def _stiffness_of(x, slave, master, at, local, margin, gap, normal_stiffness, force, d, packed):  # type: ignore[no-untyped-def]
+    n = len(slave)
+    rows = 2 * n * d
+    N, D, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty((2, 3)), np.empty(3)
+    own, outward, apart = np.empty((2, 3)), np.empty(3), np.empty((2 * n, d, 3))
+    b, S, value = np.empty((2, 2)), np.zeros((2, rows)), np.zeros((rows, rows))
+    _pair_frame(x, slave, master, at, local, margin, N, D, own, outward, tangent, normal, apart)
+    _curvature(x, master, local, normal, b)
+    by_node = apart.reshape(rows, 3)
+    G, T = np.empty(rows), np.empty((2, rows))
+    for row in range(rows):
+        G[row] = dot(by_node[row], normal)
         for r in range(2):
-            for s in range(2):
-                m[r, s] = dot(tangent[r], tangent[s])
-                A[r, s] = m[r, s] - gap[p] * b[r, s]
-        free_inverse(n, local[p], A, inverse)
-        free_inverse(n, local[p], m, inverse_metric)
-        by_node = apart.reshape(rows, 3)
-        G, T = by_node @ normal, tangent @ by_node.T
-        AT, AS, CT = inverse @ T, inverse @ S, inverse_metric @ b @ inverse @ T
-        value = normal_stiffness[p] * np.outer(G, G)
-        value -= force[p] * (S.T @ (AT + gap[p] * AS) + T.T @ (AS + CT))
-        if on_rim(n, local[p]):
-            across[:] = np.eye(3) - np.outer(normal, normal) - tangent.T @ inverse_metric @ tangent
-            value += normal_stiffness[p] * (by_node @ across @ by_node.T)
-        if margin > 0.0:
-            _add_coating(at[p], own, outward, normal, margin * force[p], N, D, value)
-        entry = 0
-        for row in range(rows):
-            for col in range(row, rows):
-                packed[p, entry] = value[row, col]
-                entry += 1
+            T[r, row] = dot(by_node[row], tangent[r])
+    for a in range(n):
+        for i in range(d):
+            for r in range(2):
+                S[r, d * (n + a) + i] = D[a, r] * normal[i]
+    _add_dyad(value, normal_stiffness, G, G)
+    inverse_metric = np.empty((2, 2))
+    _add_bending(n, local, tangent, b, gap, force, S, T, inverse_metric, value)
+    if on_rim(n, local):
+        _add_across(normal_stiffness, by_node, normal, tangent, inverse_metric, value)
+    if margin > 0.0:
+        _add_coating(at, own, outward, normal, margin * force, N, D, value)
+    entry = 0
+    for row in range(rows):
+        for col in range(row, rows):
+            packed[entry] = value[row, col]
+            entry += 1
+
+
+@jit
+def _curvature(x, face, local, normal, b):  # type: ignore[no-untyped-def]
+    """Write the curvature ``b (2, 2)`` of a face."""
+    second = np.empty((len(face), 3))
+    second_derivatives(local[0], local[1], second)
+    b[:] = 0.0
+    for a in range(len(face)):
+        height = dot(normal, x[face[a]])
+        b[0, 0] += second[a, 0] * height
+        b[1, 1] += second[a, 1] * height
+        b[0, 1] += second[a, 2] * height
+    b[1, 0] = b[0, 1]
+
+
+@jit
+def _add_bending(n, local, tangent, b, gap, force, S, T, inverse_metric, value):  # type: ignore[no-untyped-def]
+    """Add ``F ∇²g``, less what it is across a rim; writes the inverse metric among the ways of the closest point."""
+    rows = S.shape[1]
+    m, A, inverse = np.empty((2, 2)), np.empty((2, 2)), np.empty((2, 2))
+    _inner_products(tangent, m)
+    for r in range(2):
+        for s in range(2):
+            A[r, s] = m[r, s] - gap * b[r, s]
+    free_inverse(n, local, A, inverse)
+    free_inverse(n, local, m, inverse_metric)
+    AT, AS, on_S, on_T = np.empty((2, rows)), np.empty((2, rows)), np.empty((2, rows)), np.empty((2, rows))
+    for row in range(rows):
+        for r in range(2):
+            AT[r, row] = inverse[r, 0] * T[0, row] + inverse[r, 1] * T[1, row]
+            AS[r, row] = inverse[r, 0] * S[0, row] + inverse[r, 1] * S[1, row]
+        bent = (b[0, 0] * AT[0, row] + b[0, 1] * AT[1, row], b[1, 0] * AT[0, row] + b[1, 1] * AT[1, row])
+        for r in range(2):
+            on_S[r, row] = AT[r, row] + gap * AS[r, row]
+            on_T[r, row] = AS[r, row] + inverse_metric[r, 0] * bent[0] + inverse_metric[r, 1] * bent[1]
+    for r in range(2):
+        _add_dyad(value, -force, S[r], on_S[r])
+        _add_dyad(value, -force, T[r], on_T[r])
+
+
+@jit
+def _add_across(stiffness, by_node, normal, tangent, inverse_metric, value):  # type: ignore[no-untyped-def]
+    """Add ``k ∂(x − y)·Q ∂(x − y)``, Q the projection on the directions across the rim and the normal."""
+    across, moved = np.empty((3, 3)), np.empty((3, len(by_node)))
+    for i in range(3):
+        for k in range(3):
+            across[i, k] = (1.0 if i == k else 0.0) - normal[i] * normal[k]
+            for r in range(2):
+                for s in range(2):
+                    across[i, k] -= tangent[r, i] * inverse_metric[r, s] * tangent[s, k]
+    for row in range(len(by_node)):
+        for i in range(3):
+            moved[i, row] = dot(across[i], by_node[row])
+    for i in range(3):
+        _add_dyad(value, stiffness, by_node[:, i], moved[i])
