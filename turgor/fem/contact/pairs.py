@@ -81,8 +81,10 @@ def _ball(x, face, control, centre, normal):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _nearest_first(f, centre, flat, radius, rise, candidates, depth, margin, reach, near, ahead):  # type: ignore[no-untyped-def]
-    """Write the candidates of a face whose slabs it reaches, the nearest first, and how far it is from them at least.
+def _nearest_first(place, extent, behind, centre, flat, radius, rise, candidates, depth, reach, near, ahead):  # type: ignore[no-untyped-def]
+    """Write the candidates whose slabs a face reaches, the nearest first, and how far it is from them at least.
+
+    The face is in the ball around `place` with the radius `extent`, and `behind` is its depth.
 
     Return how many there are.
     """
@@ -90,13 +92,12 @@ def _nearest_first(f, centre, flat, radius, rise, candidates, depth, margin, rea
     for m in candidates:
         height = square = 0.0
         for i in range(3):
-            away = centre[f, i] - centre[m, i]
+            away = place[i] - centre[m, i]
             height += away * flat[m, i]
             square += away * away
-        extent = rise[m] + radius[f] + margin
-        if height > extent + reach or -height > extent + min(depth[f], depth[m]):
+        if height > rise[m] + extent + reach or -height > rise[m] + extent + min(behind, depth[m]):
             continue
-        distance = np.sqrt(square) - radius[f] - radius[m] - margin
+        distance = np.sqrt(square) - extent - radius[m]
         at = count
         while at > 0 and ahead[at - 1] > distance:
             near[at], ahead[at] = near[at - 1], ahead[at - 1]
@@ -136,17 +137,37 @@ def find_partners(  # type: ignore[no-untyped-def]
     for f in nb.prange(len(faces)):
         here = candidates[start[f] : start[f + 1]]
         near, ahead = np.empty(len(here), np.int32), np.empty(len(here))
-        count = _nearest_first(f, centre, flat, radius, rise, here, depth, margin, reach, near, ahead)
-        around = (centre, flat, radius, rise, rule)
-        _partners_of(f, x, faces, *around, near, ahead, count, depth, margin, reach, partner[f], local[f], gap[f])
+        around = (centre, flat, radius, rise)
+        ball = (centre[f], radius[f] + margin, depth[f])
+        count = _nearest_first(*ball, *around, here, depth, reach, near, ahead)
+        found = (partner[f], local[f], gap[f])
+        # Nothing here takes f itself, whose type differs inside the loop: all would be compiled twice.
+        _partners_of(x, faces[f], depth[f], faces, *around, rule, near, ahead, count, depth, margin, reach, *found)
 
 
 @jit
 def _partners_of(  # type: ignore[no-untyped-def]
-    f, x, faces, centre, flat, radius, rise, rule, near, ahead, count, depth, margin, reach, partner, local, gap
+    x,
+    face,
+    behind,
+    faces,
+    centre,
+    flat,
+    radius,
+    rise,
+    rule,
+    near,
+    ahead,
+    count,
+    depth,
+    margin,
+    reach,
+    partner,
+    local,
+    gap,
 ):
     """Find the partners of the points of one face among `count` faces `near`, from which it is `ahead` at least."""
-    n = faces.shape[1]
+    n = len(face)
     N, D, position, tangent, normal = np.empty(n), np.empty((n, 2)), np.empty(3), np.empty((2, 3)), np.empty(3)
     point, outward, trial, second = np.empty(3), np.empty(3), np.empty(2), np.empty((n, 3))
     away, rim_place, rim_local = np.empty(3), np.empty(3), np.empty(2)
@@ -154,13 +175,13 @@ def _partners_of(  # type: ignore[no-untyped-def]
     for q in range(len(rule) if count > 0 else 0):
         rim_gap, rim_face, sharing = np.inf, NOWHERE, 0
         shape_functions(rule[q, 0], rule[q, 1], N, D)
-        surface_frame(x, faces[f], N, D, point, tangent, outward)
+        surface_frame(x, face, N, D, point, tangent, outward)
         point += margin * outward
         for c in range(count):
             m = near[c]
             if ahead[c] > abs(gap[q]):
                 break
-            deepest = min(depth[f], depth[m])
+            deepest = min(behind, depth[m])
             away[:] = point - centre[m]
             height, far = dot(away, flat[m]), radius[m] + min(max(reach, deepest), abs(gap[q]))
             if dot(away, away) > far * far or height > rise[m] + reach or -height > rise[m] + deepest:
