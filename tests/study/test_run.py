@@ -26,6 +26,7 @@ class Watch:
 
     def __init__(self, interrupt_after: int | None = None) -> None:
         self.stages: list[str] = []
+        self.told: list[str] = []
         self.warnings: list[str] = []
         self.fractions: list[float] = []
         self.interrupt_after = interrupt_after
@@ -36,6 +37,9 @@ class Watch:
     def note(self, text: str) -> None:
         if self.interrupt_after is not None and len(self.fractions) >= self.interrupt_after:
             raise KeyboardInterrupt
+
+    def tell(self, text: str) -> None:
+        self.told.append(text)
 
     def warn(self, text: str) -> None:
         assert "mesh" not in self.stages, "too late"
@@ -248,6 +252,17 @@ def test_the_test_data_go_with_the_run(small_tube: Path, tmp_path: Path) -> None
     (moved / "data" / "soft rubber.csv").write_text("\n".join(["Strain;Stress (MPa)", *lines]), encoding="utf-8")
     with pytest.raises(InputError, match="another case"):
         run(load_case(again.folder / "case.yaml"), moved, resume=True)
+
+
+@pytest.mark.usefixtures("unreported")
+@pytest.mark.parametrize("kept", [False, True])
+def test_who_waits_for_the_compiler_is_told_so(
+    small_tube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept: bool
+) -> None:
+    monkeypatch.setattr("turgor.study.run.kernels_are_kept", lambda room: kept)
+    shown = Watch()
+    run(load_case(small_tube), tmp_path / "run", progress=shown)
+    assert any("compiled" in text for text in shown.told) is not kept
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs kill -9")

@@ -40,9 +40,13 @@ class TerminalProgress:
         """Show a detail behind the bar."""
         self._bar.update(self._task, note=text)
 
+    def tell(self, text: str) -> None:
+        """Print a line above the bar."""
+        self._bar.console.print(f"turgor: {text}", highlight=False, markup=False, soft_wrap=True)
+
     def warn(self, text: str) -> None:
         """Print a warning above the bar."""
-        self._bar.console.print(f"turgor: warning: {text}", highlight=False, markup=False, soft_wrap=True)
+        self.tell(f"warning: {text}")
 
     def advance(self, fraction: float, text: str) -> None:
         """Set the part of the load that is reached, 0 to 1."""
@@ -70,9 +74,13 @@ class LineProgress:
     def note(self, text: str) -> None:
         """Leave out what the next line would repeat."""
 
+    def tell(self, text: str) -> None:
+        """Print a line."""
+        self._console.print(f"turgor: {text}", highlight=False, markup=False, soft_wrap=True)
+
     def warn(self, text: str) -> None:
         """Print a warning."""
-        self._console.print(f"turgor: warning: {text}", highlight=False, markup=False, soft_wrap=True)
+        self.tell(f"warning: {text}")
 
     def advance(self, fraction: float, text: str) -> None:
         """Say the part of the load that is reached, 0 to 1."""

@@ -34,6 +34,12 @@ def keep_kernels_by_source(package: Path) -> None:
     os.environ[VARIABLE] = str(place)
 
 
+def kernels_are_kept(room: str) -> bool:
+    """Whether kernels of a package's folder of that name were compiled before, as far as that can be told."""
+    place = os.environ.get(VARIABLE)
+    return place is None or any(Path(place).glob(f"{room}_*/*.nbi"))
+
+
 def kernels_of(package: Path) -> Path:
     """Return the folder for the kernels of a package's sources as they are."""
     digest = hashlib.sha1(usedforsecurity=False)

@@ -16,6 +16,10 @@ class Progress(Protocol):
         """Tell a detail that the next one replaces, such as an iteration."""
         ...
 
+    def tell(self, text: str) -> None:
+        """Say what is worth knowing."""
+        ...
+
     def warn(self, text: str) -> None:
         """Say what the user should know before going on."""
         ...
@@ -32,6 +36,9 @@ class Silent:
         """Do nothing."""
 
     def note(self, text: str) -> None:
+        """Do nothing."""
+
+    def tell(self, text: str) -> None:
         """Do nothing."""
 
     def warn(self, text: str) -> None:

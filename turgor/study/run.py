@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from turgor.common.compiled import kernels_are_kept
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.common.units import from_internal
@@ -125,6 +126,8 @@ class _Running:
         with self._resumed() if continues else nullcontext() as stored:
             mesh = stored.mesh if stored else self._meshed()
             self.show.stage("system")
+            if not kernels_are_kept("contact" if self.case.contact else "fem"):
+                self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
             system = system_of(self.case, mesh, materials)
             course = self.case.course(system)
             # Nothing is written before everything that can be checked has been.
