@@ -245,8 +245,8 @@ class System:
         for k, term in enumerate(self.terms):
             if len(term.nodes):
                 block_products(term.nodes, self._block(packed, k), local, product)
-        for nodes, packed in self._touching:
-            block_products(nodes, packed, local, product)
+        for nodes, touching in self._touching:
+            block_products(nodes, touching, local, product)
         return self.constraints.from_frames(product)
 
     def free_part(self, nodal: Floats) -> Floats:

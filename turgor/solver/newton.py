@@ -214,51 +214,49 @@ def _advanced(system: System, state: State, step: Step, residuals: list[float], 
 
 
 def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float) -> float:
-    """Return the part of the step to take: all of it unless the merit rises, and often even then."""
-    start = system.merit(state, lagged)
-    full = system.merit(state.moved(longest * du), lagged)
+    """Return the part of the step to take: all of it unless the merit rises, and often even then.
+
+    With a barrier a step that the merit would shorten is taken all the same where the forces are less out of balance
+    after it.
+    """
+
+    def merit(part: float) -> float:
+        return system.merit(state.moved(part * du), lagged)
+
+    start, full = system.merit(state, lagged), merit(longest)
     if any(system.contact_force(at) > 0.0 for at in (state, state.moved(longest * du))):
-        return _until_it_falls(system, state, du, lagged, longest, start, full)
-    if full <= start:
-        return longest
-    return _until_it_rises_little(system, state, du, lagged, longest, start, full)
+        best = _until_it_falls(merit, longest, start, full)
+        return longest if best < longest and system.has_barrier and _balances(system, state, longest * du) else best
+    return longest if full <= start else _until_it_rises_little(merit, longest, start, full)
 
 
-def _until_it_rises_little(
-    system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float, start: float, full: float
-) -> float:
+def _until_it_rises_little(merit: Callable[[float], float], longest: float, start: float, full: float) -> float:
     """Return the longest of ever shorter parts of the step with which the merit rises no more than it may.
 
     If it rises from the beginning, the step leads to an unstable state, or so far astray that the next one will tell.
     """
-    promised = 0.5 * (start - system.merit(state.moved(SHORT * longest * du), lagged)) / SHORT
+    promised = 0.5 * (start - merit(SHORT * longest)) / SHORT
     if not promised > 0.0:
         return longest
-    part, merit = longest, full
+    part, now = longest, full
     # Written so that what is not a number is too much.
-    while not merit - start <= RISE_ALLOWED * promised and part > SHORT * longest:
+    while not now - start <= RISE_ALLOWED * promised and part > SHORT * longest:
         part *= 0.5
-        merit = system.merit(state.moved(part * du), lagged)
+        now = merit(part)
     return part
 
 
-def _until_it_falls(
-    system: System, state: State, du: Floats, lagged: tuple[Floats, ...], longest: float, start: float, full: float
-) -> float:
-    """Return the longest of a few ever shorter parts of the step with which the merit falls enough, or else the best.
-
-    With a barrier it is the longest too where the forces are less out of balance after it.
-    """
+def _until_it_falls(merit: Callable[[float], float], longest: float, start: float, full: float) -> float:
+    """Return the longest of ever shorter parts of the step with which the merit falls enough, or else the best."""
     rounding = ROUNDING * abs(start)
     parts, merits = [longest], [full]
     while len(parts) < TRIALS:
         parts.append(0.5 * parts[-1])
-        merits.append(system.merit(state.moved(parts[-1] * du), lagged))
+        merits.append(merit(parts[-1]))
         if merits[-2] <= start - ENOUGH * max(start - merits[-1], 0.0) + rounding:
             del parts[-1], merits[-1]
             break
-    best = parts[int(np.argmin(merits))]
-    return longest if best < longest and system.has_barrier and _balances(system, state, longest * du) else best
+    return parts[int(np.argmin(merits))]
 
 
 def _balances(system: System, state: State, du: Floats) -> bool:
