@@ -10,7 +10,7 @@ import pytest
 
 import turgor
 from turgor.common.compiled import UNUSED_S, VARIABLE, keep_kernels_by_source, kernels_are_kept, kernels_of
-from turgor.fem.contact.pairs import balls
+from turgor.fem.contact.partners import balls
 
 
 @pytest.fixture

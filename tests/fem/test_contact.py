@@ -11,7 +11,7 @@ from contact_checks import check_contact, check_obstacle
 from samples import check_assembled, neo_hookean, random_state
 
 from turgor.common.errors import InputError
-from turgor.fem.contact.pairs import balls, find_partners
+from turgor.fem.contact.partners import balls, find_partners
 from turgor.fem.contact.shapes import second_derivatives, shape_functions
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
@@ -155,7 +155,7 @@ def test_closest_points_are_closest(kind):
     shape_of = (2, len(skin.rule))
     partner, at, gap = np.empty(shape_of, np.int32), np.empty((*shape_of, 2)), np.empty(shape_of)
     where = (start, candidates, np.ones(2), 0.0, 1.0)
-    find_partners(points, faces, *balls(points, faces), skin.rule, *where, partner, at, gap)
+    find_partners(points, faces, balls(points, faces), skin.rule, *where, partner, at, gap)
     assert (partner[1] == 0).all()
     slaves = skin.shape @ points[faces[1]]
     nearest = np.array([np.linalg.norm(slave - surface, axis=1).min() for slave in slaves])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.fem.contact.closest import dot
-from turgor.fem.contact.pairs import FACING, Balls, balls
+from turgor.fem.contact.partners import FACING, Balls, balls
 from turgor.fem.contact.skin import Skin
 from turgor.fem.kernels import jit, parallel
 

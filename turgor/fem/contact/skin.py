@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from turgor.fem.contact.pairs import FACING, balls
+from turgor.fem.contact.partners import FACING, balls
 from turgor.fem.section import Section, depth
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.cells import CELLS, Cell, Rule, face_areas, face_cell, jacobians

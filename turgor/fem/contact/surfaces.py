@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from turgor.fem.contact.friction import PLACE, Rubbing, grips_in, make_rows, points_of, renewed, rubbing
 from turgor.fem.contact.intersection import IntersectionCheck
-from turgor.fem.contact.pairs import NOWHERE, balls, find_partners, gap_gradients, pair_stiffness
+from turgor.fem.contact.pairs import gap_gradients, pair_stiffness
+from turgor.fem.contact.partners import NOWHERE, balls, find_partners
 from turgor.fem.contact.recent import Recent
 from turgor.fem.contact.search import Search
 from turgor.fem.contact.skin import SOON, STIFFNESS, Skin
@@ -233,7 +234,7 @@ class SurfaceContact:
         around = balls(x, skin.faces)
         start, candidates = self._search.candidates(around, reach)
         where = (start, candidates, skin.depth, margin, reach)
-        find_partners(x, skin.faces, *around, rule, *where, partner, local, gap)
+        find_partners(x, skin.faces, around, rule, *where, partner, local, gap)
         face, quad = np.nonzero(partner != NOWHERE)
         overlap = gap[face, quad]
         return Pairs(face, quad, partner[face, quad], rule[quad], local[face, quad], overlap + margin, overlap)
