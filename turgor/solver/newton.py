@@ -224,10 +224,11 @@ def _searched(system: System, state: State, du: Floats, lagged: tuple[Floats, ..
         return system.merit(state.moved(part * du), lagged)
 
     start, full = system.merit(state, lagged), merit(longest)
+    rounding = ROUNDING * abs(start)
     if any(system.contact_force(at) > 0.0 for at in (state, state.moved(longest * du))):
-        best = _until_it_falls(merit, longest, start, full)
+        best = _until_it_falls(merit, longest, start, full, rounding)
         return longest if best < longest and system.has_barrier and _balances(system, state, longest * du) else best
-    return longest if full <= start else _until_it_rises_little(merit, longest, start, full)
+    return longest if full <= start + rounding else _until_it_rises_little(merit, longest, start, full)
 
 
 def _until_it_rises_little(merit: Callable[[float], float], longest: float, start: float, full: float) -> float:
@@ -246,9 +247,10 @@ def _until_it_rises_little(merit: Callable[[float], float], longest: float, star
     return part
 
 
-def _until_it_falls(merit: Callable[[float], float], longest: float, start: float, full: float) -> float:
+def _until_it_falls(
+    merit: Callable[[float], float], longest: float, start: float, full: float, rounding: float
+) -> float:
     """Return the longest of ever shorter parts of the step with which the merit falls enough, or else the best."""
-    rounding = ROUNDING * abs(start)
     parts, merits = [longest], [full]
     while len(parts) < TRIALS:
         parts.append(0.5 * parts[-1])
