@@ -70,6 +70,12 @@ def registry() -> pint.UnitRegistry[Any]:
     return units
 
 
+@functools.lru_cache(maxsize=1000)
+def _unit(text: str) -> pint.Unit:
+    # A study reads the same few units again and again, each of which takes pint half a millisecond.
+    return registry().parse_units(text)
+
+
 def to_internal(value: object, dimension: str, *, key: str | None = None) -> float:
     """Convert a quantity to the internal unit of its `dimension`.
 
@@ -101,9 +107,9 @@ def to_internal(value: object, dimension: str, *, key: str | None = None) -> flo
         raise InputError("a unit is missing", key=key, value=value, expected=expected)
     if dimension == "angle" and quantity.unitless:
         raise InputError("a unit is missing", key=key, value=value, expected=expected)
-    if not quantity.check(units.parse_units(target).dimensionality):
+    if not quantity.check(_unit(target).dimensionality):
         raise InputError(f"'{quantity.units:~}' is not a unit of {dimension}", key=key, value=value, expected=expected)
-    number = float(quantity.to(target).magnitude)
+    number = float(quantity.to(_unit(target)).magnitude)
     if not math.isfinite(number):
         raise InputError("the number is not finite", key=key, value=value, expected=expected)
     return number
@@ -142,7 +148,7 @@ def _parse(text: str, expected: str, key: str | None) -> pint.Quantity[Any]:
     if match["unit"] is None:
         raise InputError("a unit is missing", key=key, value=text, expected=expected)
     try:
-        unit = registry().parse_units(match["unit"].strip())
+        unit = _unit(match["unit"].strip())
     except Exception as error:  # pint's parser lets several kinds of exception through
         raise InputError("this is not a quantity with a known unit", key=key, value=text, expected=expected) from error
     return registry().Quantity(float(match["number"]), unit)
