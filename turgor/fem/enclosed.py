@@ -131,6 +131,7 @@ _EDGE = CELLS["line3"]
 _N, _D = _EDGE.shape_at_quadrature, _EDGE.gradient_at_quadrature[:, :, 0]
 _ND = np.einsum("q,qa,qb->ab", _EDGE.weights, _N, _D)
 _NND = np.einsum("q,qa,qb,qc->abc", _EDGE.weights, _N, _N, _D)
+_RRY, _RYR = _NND.reshape(9, 3), _NND.reshape(3, 9).T
 
 
 class EdgeVolume:
@@ -174,15 +175,16 @@ class RevolvedVolume:
 
     def volume(self, x: Floats) -> float:
         """Return the volume, mm³."""
-        r, y = np.moveaxis(x[self.nodes], 2, 0)
-        return math.pi * float(np.einsum("ka,kb,kc,abc->", r, r, y, _NND, optimize=True))
+        r, y = self._places(x)
+        return math.pi * float(np.vdot(_products(r, r) @ _RRY, y))
 
     def gradient(self, x: Floats) -> Floats:
         """Return the derivative by the nodes, ``(k, 3, 2)``."""
-        r, y = np.moveaxis(x[self.nodes], 2, 0)
-        by_radius = 2.0 * math.pi * np.einsum("kb,kc,abc->ka", r, y, _NND, optimize=True)
-        by_height = math.pi * np.einsum("ka,kb,abc->kc", r, r, _NND, optimize=True)
-        return np.stack([by_radius, by_height], axis=2)
+        r, y = self._places(x)
+        gradient = np.empty((*self.nodes.shape, 2))
+        gradient[:, :, 0] = 2.0 * math.pi * (_products(r, y) @ _RYR)
+        gradient[:, :, 1] = math.pi * (_products(r, r) @ _RRY)
+        return gradient
 
     def traction(self, x: Floats) -> Floats:
         """Return what a unit pressure pushes the nodes with, ``(k, 3, 2)``."""
@@ -192,12 +194,22 @@ class RevolvedVolume:
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 6, 6)``."""
-        r, y = np.moveaxis(x[self.nodes], 2, 0)
+        r, y = self._places(x)
         hessian = np.zeros((len(self.nodes), 3, 2, 3, 2))
-        hessian[:, :, 0, :, 0] = 2.0 * math.pi * np.einsum("kc,abc->kab", y, _NND)
-        mixed = 2.0 * math.pi * np.einsum("kb,abc->kac", r, _NND)
+        hessian[:, :, 0, :, 0] = 2.0 * math.pi * (y @ _RRY.T).reshape(-1, 3, 3)
+        mixed = 2.0 * math.pi * (r @ _NND.swapaxes(0, 1).reshape(3, 9)).reshape(-1, 3, 3)
         hessian[:, :, 0, :, 1], hessian[:, :, 1, :, 0] = mixed, mixed.swapaxes(1, 2)
         return hessian.reshape(-1, 6, 6)
+
+    def _places(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return radii and heights of each edge's nodes, ``(k, 3)``."""
+        places = x[self.nodes]
+        return places[:, :, 0], places[:, :, 1]
+
+
+def _products(a: Floats, b: Floats) -> Floats:
+    """Return ``a_i b_j`` of each edge, ``(k, 9)``."""
+    return (a[:, :, None] * b[:, None, :]).reshape(-1, 9)
 
 
 def _tractions(places: Floats, shape: Floats, gradient: Floats, weights: Floats) -> Floats:
