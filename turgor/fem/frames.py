@@ -70,14 +70,19 @@ def block_products(nodes, packed, field, out):  # type: ignore[no-untyped-def]
     """Add the products of packed symmetric blocks with a nodal ``field (n_points, d)`` to ``out (n_points, d)``."""
     d = field.shape[1]
     n = d * nodes.shape[1]
+    here, there = np.empty(n), np.empty(n)
     for block in range(len(nodes)):
+        for row in range(n):
+            here[row] = field[nodes[block, row // d], row % d]
+        there[:] = 0.0
         at = 0
         for row in range(n):
-            a, i = nodes[block, row // d], row % d
-            for col in range(row, n):
-                b, k = nodes[block, col // d], col % d
-                value = packed[block, at]
-                out[a, i] += value * field[b, k]
-                if col != row:
-                    out[b, k] += value * field[a, i]
-                at += 1
+            values = packed[block, at : at + n - row]
+            above, total = here[row], values[0] * here[row]
+            for k in range(1, n - row):
+                total += values[k] * here[row + k]
+                there[row + k] += values[k] * above
+            there[row] += total
+            at += n - row
+        for row in range(n):
+            out[nodes[block, row // d], row % d] += there[row]

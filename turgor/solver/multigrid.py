@@ -102,10 +102,11 @@ def corner_interpolation(cells: Ints) -> tuple[Ints, sp.csr_matrix]:
     corners, number = np.unique(cells[:, : cell.n_corners], return_inverse=True)
     number = number.reshape(len(cells), cell.n_corners)
     n_nodes = int(cells.max()) + 1
-    # Cells that share a node agree on it: the first one that has it speaks.
-    nodes, first = np.unique(cells, return_index=True)
-    assert len(nodes) == n_nodes
-    owner, local = np.divmod(first, cell.n_nodes)
+    # Cells that share a node agree on it: whichever has it speaks.
+    place = np.full(n_nodes, -1)
+    place[cells.ravel()] = np.arange(cells.size)
+    assert place.min() >= 0
+    owner, local = np.divmod(place, cell.n_nodes)
     weights = cell.corner_shape_at_nodes[local]
     row, at = np.nonzero(weights > 1e-12)
     return corners, sp.csr_matrix((weights[row, at], (row, number[owner[row], at])), shape=(n_nodes, len(corners)))

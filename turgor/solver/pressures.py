@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numba as nb
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from turgor.fem.kernels import CHUNKS, parallel
@@ -36,10 +37,11 @@ class Pressures:
         self._places: Ints = rank[np.concatenate(groups)]
         self._free = free
         # Of each node the elements that it belongs to and its number in them.
-        order = np.argsort(self._places.ravel(), kind="stable").astype(np.int32)
-        self._elements, self._corners = np.divmod(order, np.int32(self._places.shape[1]))
-        counts = np.bincount(self._places.ravel(), minlength=len(rank))
-        self._start = np.concatenate([[0], np.cumsum(counts)])
+        m, n = self._places.shape
+        corner = np.tile(np.arange(n, dtype=np.int32), m)
+        cells = sp.csr_matrix((corner, self._places.ravel(), np.arange(0, m * n + 1, n)), shape=(m, len(rank)))
+        nodes = cells.T.tocsr()
+        self._start, self._elements, self._corners = nodes.indptr.astype(np.int64), nodes.indices, nodes.data
 
     def take(self, equations: Sequence[VolumeEquations]) -> None:
         """Take the equations of the solids at a state."""
