@@ -12,7 +12,7 @@ from samples import neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.common.optional import is_available
-from turgor.fem.loads import Pressure
+from turgor.fem.loads import Force, Pressure
 from turgor.fem.section import PlaneStrain
 from turgor.fem.supports import Clamped, Prescribed, Sliding
 from turgor.fem.system import System
@@ -20,11 +20,11 @@ from turgor.geometry.tube import CappedTube
 from turgor.mesh.cells import body_cell
 from turgor.mesh.generate import generate
 from turgor.mesh.structured import box, rectangle, shell_octant
-from turgor.solver import choice, coarse, iterative
+from turgor.solver import choice, coarse, iterative, linear
 from turgor.solver.blocks import BlockMatrix
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.iterative import AUGMENTATION, Iterative
-from turgor.solver.krylov import gmres
+from turgor.solver.krylov import gmres, softest
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.multigrid import TwoLevels, corner_interpolation
 from turgor.solver.newton import NewtonOptions, find_equilibrium
@@ -94,8 +94,8 @@ def test_it_finds_the_same_equilibrium_as_the_factorisation(build, ratio, monkey
     assert found.iterations <= expected.iterations + 2
     assert len(solver.iterations) == found.iterations
     assert max(solver.iterations) <= 30
-    assert found.negative_pivots is None
-    assert found.stable is None
+    assert found.stable
+    assert not solver._factorised
 
 
 def test_inner_iterations_do_not_depend_on_the_mesh():
@@ -239,6 +239,51 @@ def test_it_follows_the_path_by_volume_to_the_same_limit():
     assert limits[1] == pytest.approx(limits[0], rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("length", "part", "pivots", "factorised"),
+    [(40.0, 0.9, 0, False), (40.0, 0.95, 0, True), (40.0, 1.0, 1, True), (40.0, 5.0, 2, True), (160.0, 0.97, 1, True)],
+    ids=["definite", "definite by its volumes alone", "buckled", "buckled twice", "lost in single precision"],
+)
+def test_it_tells_the_inertia_of_a_straight_column(length, part, pivots, factorised):
+    # Euler's load of a column that is clamped at one end, with E = 3 μ.
+    second_moment = 5.2 * 4.0**3 / 12.0
+    load = np.pi**2 * 0.3 * second_moment / (4.0 * length**2)
+    mesh = box((length, 4.0, 5.2), (round(length / 2.0), 2, 2))
+    system = System(mesh, {"body": neo_hookean(0.1)}, [Clamped("x0")], [Force("x1", (-part * load, 0.0, 0.0))])
+    solver, exact = Iterative(system), direct(system)
+    straight = find_equilibrium(system, exact, system.reference_state(), 1.0, NewtonOptions())
+    assert straight.negative_pivots == pivots
+    solver.take_stiffness(system, straight.state)
+    assert solver.negative_pivots is None
+    assert solver.inertia() == pivots
+    assert solver._factorised is factorised
+
+
+def test_it_does_not_tell_the_inertia_where_it_takes_factors_that_do_not_fit(monkeypatch, caplog):
+    system = sphere("tet10", 1)
+    solver = Iterative(system)
+    solver.take_stiffness(system, system.reference_state())
+    monkeypatch.setattr(iterative, "MOST_FOR_INERTIA", 1)
+    assert solver.inertia() == 0
+    assert solver._factorised
+    solver.take_stiffness(system, system.reference_state())
+    monkeypatch.setattr(iterative, "factors_fit", lambda _: False)
+    assert solver.inertia() is None
+    assert "does not fit into the memory" in caplog.text
+
+
+def test_the_softest_direction():
+    rng = np.random.default_rng(1)
+    frame = np.linalg.qr(rng.standard_normal((90, 90)))[0]
+    values = np.concatenate([[1e-3], np.linspace(0.2, 1.0, 89)])
+    matrix = frame @ np.diag(values) @ frame.T
+    direction, energy = softest(improving(matrix, np.eye(90)), 90, 60)
+    assert energy == pytest.approx(direction @ matrix @ direction)
+    assert abs(direction @ frame[:, 0]) == pytest.approx(np.linalg.norm(direction), rel=1e-3)
+    assert softest(improving(matrix, np.eye(90)), 90, 4) is None
+    assert softest(improving(matrix - 0.002 * np.eye(90), np.eye(90)), 90, 60) is None
+
+
 def test_gmres():
     rng = np.random.default_rng(0)
     matrix = rng.standard_normal((90, 90)) + 12.0 * np.diag(np.sign(rng.standard_normal(90)))
@@ -301,7 +346,7 @@ def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
 def test_it_is_chosen_where_factors_would_not_fit(monkeypatch):
     system = sphere("tet10", 1)
     for free_mb, expected in ((1e3, LinearSolver), (0.1, Iterative)):
-        monkeypatch.setattr(choice, "free_memory_mb", lambda free=free_mb: free)
+        monkeypatch.setattr(linear, "free_memory_mb", lambda free=free_mb: free)
         assert isinstance(make_stiffness_solver(system), expected)
 
 

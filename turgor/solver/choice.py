@@ -8,21 +8,18 @@ from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.fem.system import System
 from turgor.solver.iterative import Iterative
-from turgor.solver.linear import free_memory_mb, make_linear_solver
+from turgor.solver.linear import factors_fit, make_linear_solver
 from turgor.solver.stiffness import StiffnessSolver
 
 log = logger("solver")
 
 LinearPath = Literal["auto", "direct", "iterative"]
 
-ITERATIVE_FROM = 200_000
+ITERATIVE_FROM = 100_000
 """Unknowns from which the iterative path is chosen by itself.
 
-It is faster from a fifth of that on, but cannot tell whether a state is stable.
+With thick walls it is faster from a fifth of that on, with thin ones about from there.
 """
-
-FACTORS_KB = 14.0
-"""Memory that a factorisation takes for an unknown, kB, in space at the sizes that fill a machine's memory."""
 
 
 def make_stiffness_solver(system: System, path: LinearPath = "auto") -> StiffnessSolver:
@@ -48,11 +45,11 @@ def make_stiffness_solver(system: System, path: LinearPath = "auto") -> Stiffnes
             value=path,
             expected="auto, direct or iterative",
         )
-    short = system.n_dofs * FACTORS_KB > 2**10 * free_memory_mb()
-    wanted = path == "iterative" or (path == "auto" and (short or system.n_dofs >= ITERATIVE_FROM))
+    large = system.n_dofs >= ITERATIVE_FROM or not factors_fit(system.n_dofs)
+    wanted = path == "iterative" or (path == "auto" and large)
     reason = not_iterative(system)
     if wanted and reason is None:
-        log.info("linear solver: %s; it cannot tell whether a state is stable", Iterative.name)
+        log.info("linear solver: %s", Iterative.name)
         return Iterative(system)
     if wanted:
         tell = log.warning if path == "iterative" else log.info

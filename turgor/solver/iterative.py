@@ -25,8 +25,8 @@ from turgor.common.log import logger
 from turgor.fem.pattern import SparsePattern
 from turgor.fem.state import State
 from turgor.fem.system import System
-from turgor.solver.krylov import gmres
-from turgor.solver.linear import LinearSolver, make_linear_solver
+from turgor.solver.krylov import gmres, softest
+from turgor.solver.linear import LinearSolver, factors_fit, make_linear_solver
 from turgor.solver.multigrid import TwoLevels
 from turgor.solver.pressures import Pressures
 from turgor.solver.stiffness import ACCURATE, FORCING, Solution, StiffnessSolver
@@ -44,6 +44,12 @@ With less, the pressures are harder to find; with more, A is harder to smooth.
 
 MOST_ITERATIONS = 180
 """Of one linear problem; then it is factorised."""
+
+MOST_FOR_INERTIA = 60
+"""Iterations in which A is seen to be definite; else the tangent is factorised to tell its inertia."""
+
+ROUNDED = 0.5
+"""Part of A's least energy by which single precision may change it, if it is to speak for the energy's sign."""
 
 FAILURES = 3
 """Tangents on which the method has failed, after which all are factorised."""
@@ -105,8 +111,34 @@ class Iterative(StiffnessSolver):
 
     @property
     def negative_pivots(self) -> int | None:
-        """Unknown, unless the stiffness had to be factorised."""
+        """Known where the stiffness had to be factorised, and by :meth:`inertia`."""
         return self._factors().negative_pivots if self._factorised else None
+
+    def inertia(self) -> int | None:
+        """Return the number of negative eigenvalues; ``None`` where only factors that do not fit would tell.
+
+        There is none if A has none, for what is condensed into it adds energy. A holds enough of the bulk modulus to be
+        definite at nearly all stable states; where it is not seen to be, the stiffness is factorised.
+        """
+        if self._factorised:
+            return self.negative_pivots
+        if self._is_definite():
+            return 0
+        if not factors_fit(self._system.n_dofs):
+            log.warning(
+                "whether the state is stable only a factorisation could tell, which does not fit into the memory"
+            )
+            return None
+        return self._factors().inertia()
+
+    def _is_definite(self) -> bool:
+        """Whether A is seen to be positive definite, also in double precision where it is softest."""
+        found = softest(self._levels.apply, 3 * len(self._levels.free), MOST_FOR_INERTIA)
+        if found is None:
+            return False
+        direction, energy = found
+        exact = float(np.vdot(direction, self._forces(direction)))
+        return abs(exact - energy) <= ROUNDED * energy
 
     def _solution(self, system: System, right: Floats, problem: _Problem | None, accuracy: float) -> Solution:
         found = self._found(problem, accuracy)
@@ -171,11 +203,15 @@ class Iterative(StiffnessSolver):
     def _residual(self, load: Floats, x: Floats) -> Floats:
         """Return what displacements and pressures leave of the mixed problem, in double precision."""
         n = len(load)
+        forces = self._forces(x[:n]) + self._pressures.forces(x[n:])
+        return np.concatenate([load - forces, -self._pressures.residual(x[:n], x[n:])])
+
+    def _forces(self, u: Floats) -> Floats:
+        """Return A u in double precision, zero where nothing is unknown."""
         order, free = self._levels.fine.order, self._levels.free
         nodal = np.empty((len(order), 3))
-        nodal[order] = x[:n].reshape(-1, 3)
-        forces = (self._system.stiffness_times(nodal)[order] * free).ravel() + self._pressures.forces(x[n:])
-        return np.concatenate([load - forces, -self._pressures.residual(x[:n], x[n:])])
+        nodal[order] = u.reshape(-1, 3) * free
+        return (self._system.stiffness_times(nodal)[order] * free).ravel()
 
     def _precondition(self, x: Floats) -> tuple[Floats, Floats]:
         """Return what the preconditioner makes of a residual, and the product of the matrix with it."""

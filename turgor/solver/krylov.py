@@ -1,4 +1,4 @@
-"""The flexible generalised minimal residual method (Saad 1993).
+"""The flexible generalised minimal residual method (Saad 1993), and the softest direction of a symmetric matrix.
 
 Flexible, as a preconditioner in single precision is not linear to the last digits of a double. The directions are made
 orthogonal by kernels of our own: NumPy's products of vectors start threads each time, which on a busy machine takes
@@ -20,6 +20,14 @@ Preconditioner = Callable[[Floats], tuple[Floats, Floats]]
 
 RESTART = 60
 """Directions that are kept; then the method begins anew from where it is."""
+
+SURE = 0.5
+ENOUGH = 12
+"""The least eigenvalue counts as found where its equation leaves this part of it, after so many directions at least.
+
+Among those of an indefinite matrix one of negative energy was found after eight at most: columns of two meshes next to
+their buckling loads and far beyond, six random vectors each.
+"""
 
 CANCELLED = 0.7
 """A direction that shrinks below this part of itself is made orthogonal once more, as rounding has left it oblique
@@ -56,22 +64,97 @@ def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: 
     return solution, done, _length(residual) <= goal
 
 
+def softest(preconditioner: Preconditioner, n: int, most: int) -> tuple[Floats, float] | None:
+    """Find the direction in which a symmetric positive definite matrix is softest, by a random vector's Krylov space.
+
+    It belongs to the least eigenvalue of the preconditioned matrix (Arnoldi's method; Saad 2011, sec. 6.2). A
+    preconditioner that nearly solves for the soft modes leaves the eigenvalue that is about to change its sign alone
+    below the others, where the method finds it first.
+
+    Parameters
+    ----------
+    preconditioner
+        As for :func:`gmres`.
+    n
+        Number of unknowns.
+    most
+        Iterations allowed.
+
+    Returns
+    -------
+    direction, energy
+        The direction ``(n,)`` and its product with the matrix and itself. ``None`` where a direction has a negative
+        energy, or none is found to be the softest.
+    """
+    start = np.random.default_rng(0).standard_normal(n)
+    space = _Krylov(preconditioner, start / _length(start), most)
+    onto = np.zeros((most + 1, most))
+    for step in range(most):
+        left = float(space.grow()[-1])
+        k = step + 1
+        # The products of all directions with the basis give the energies.
+        onto[: k + 1, step] = _products(space.basis[: k + 1], space.improved[step])
+        onto[k, :step] = _products(space.improved[:step], space.basis[k])
+        energy = onto[: k + 1, :k].T @ space.columns[: k + 1, :k]
+        sizes = np.sqrt(np.abs(np.diag(energy)))
+        if not np.linalg.eigvalsh((energy + energy.T) / np.outer(sizes, sizes))[0] > 0.0:
+            return None
+        if k < ENOUGH:
+            continue
+        values, vectors = np.linalg.eig(space.columns[:k, :k])
+        least = int(np.argmin(values.real))
+        if left * abs(vectors[-1, least]) <= SURE * values[least].real:
+            weights, direction = vectors[:, least].real, np.zeros(n)
+            _add_combined(space.improved, weights, direction)
+            return direction, float(weights @ energy @ weights)
+    return None
+
+
+class _Krylov:
+    """A space that grows by one direction after another, orthonormal, and what the matrix makes of the improved ones.
+
+    Attributes
+    ----------
+    basis
+        The directions, ``(most + 1, n)``.
+    improved
+        What the preconditioner makes of them, ``(most, n)``.
+    columns
+        The matrix times the improved ones in terms of the basis, ``(most + 1, most)``.
+    """
+
+    def __init__(self, preconditioner: Preconditioner, first: Floats, most: int) -> None:
+        self._preconditioner = preconditioner
+        # What is not written to takes no memory.
+        self.basis, self.improved = np.empty((most + 1, len(first))), np.empty((most, len(first)))
+        self.basis[0] = first
+        self.columns = np.zeros((most + 1, most))
+        self._size = 0
+
+    def grow(self) -> Floats:
+        """Take one direction more; return its column, ``(size + 2,)``, the length that was left of it last."""
+        k = self._size
+        self.improved[k], direction = self._preconditioner(self.basis[k])
+        column = _orthogonalised(self.basis[: k + 1], direction)
+        self.columns[: k + 2, k], length = column, float(column[-1])
+        self.basis[k + 1] = direction / length if length else 0.0
+        self._size += 1
+        return column
+
+
 def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: int) -> tuple[Floats, Floats, int]:
     """Lessen the residual to `goal`, or as far as `most` directions reach.
 
     Returns the change, the product of the matrix with it, and how many directions were taken.
     """
     size = _length(residual)
-    # What is not written to takes no memory.
-    basis, improved = np.empty((most + 1, len(residual))), np.empty((most, len(residual)))
-    basis[0] = residual / size
-    columns, triangle = np.zeros((most + 1, most)), np.zeros((most, most))
+    space = _Krylov(preconditioner, residual / size, most)
+    triangle = np.zeros((most, most))
     rotations: list[tuple[float, float]] = []
     target = [size]
     for step in range(most):
-        improved[step], direction = preconditioner(basis[step])
-        column = _orthogonalised(basis[: step + 1], direction)
-        columns[: step + 2, step], length = column, float(column[-1])
+        column = space.grow()
+        length = float(column[-1])
         for k, (c, s) in enumerate(rotations):
             column[k : k + 2] = c * column[k] + s * column[k + 1], c * column[k + 1] - s * column[k]
         radius = float(np.hypot(column[step], length))
@@ -83,7 +166,6 @@ def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: 
         triangle[: step + 1, step] = column[: step + 1]
         target.append(-s * target[step])
         target[step] *= c
-        basis[step + 1] = direction / length if length else 0.0
         if abs(target[-1]) <= goal or length == 0.0:
             break
     n = len(rotations)
@@ -91,8 +173,8 @@ def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: 
         return np.zeros_like(residual), np.zeros_like(residual), 1
     weights = np.asarray(np.linalg.solve(triangle[:n, :n], target[:n]), float)
     change, product = np.zeros_like(residual), np.zeros_like(residual)
-    _add_combined(improved, weights, change)
-    _add_combined(basis, columns[: n + 1, :n] @ weights, product)
+    _add_combined(space.improved, weights, change)
+    _add_combined(space.basis, space.columns[: n + 1, :n] @ weights, product)
     return change, product, n
 
 

@@ -111,6 +111,15 @@ def free_memory_mb() -> float:
     return float(psutil.virtual_memory().available) / 2**20
 
 
+FACTORS_KB = 14.0
+"""Memory that a factorisation takes for an unknown, kB, in space at the sizes that fill a machine's memory."""
+
+
+def factors_fit(n_dofs: int) -> bool:
+    """Whether the factors of a body in space are expected to fit into the memory that is free."""
+    return n_dofs * FACTORS_KB <= 2**10 * free_memory_mb()
+
+
 def warn_of_memory(needed_mb: float) -> None:
     """Say in the log before a factorisation that it takes more memory, MB, than the machine has free."""
     if needed_mb > (free_mb := free_memory_mb()):
@@ -304,6 +313,7 @@ class SuperLU(LinearSolver):
     """SuperLU (Li 2005) as SciPy carries it: unsymmetric, on one thread, without inertia."""
 
     name = "SuperLU"
+    tells_inertia = False
 
     def take(self, row_start: Ints, column: Ints) -> None:
         """Begin anew with another pattern."""

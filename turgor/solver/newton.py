@@ -284,7 +284,7 @@ def _accepted(
         fraction,
         tuple(progress.residuals),
         len(progress.tangents),
-        tangent.negative_pivots,
+        tangent.inertia(),
         tangent.compliance,
     )
 

@@ -49,11 +49,13 @@ class Solution:
 class StiffnessSolver(ABC):
     """Solves with the stiffness of one state after another.
 
-    ``cheap_again`` says whether a further solution with the same stiffness costs little beside the first.
+    ``cheap_again`` says whether a further solution with the same stiffness costs little beside the first,
+    ``tells_inertia`` whether the solver can find the signs of the eigenvalues.
     """
 
     name: ClassVar[str]
     cheap_again: ClassVar[bool] = True
+    tells_inertia: ClassVar[bool] = True
 
     @abstractmethod
     def take_stiffness(self, system: System, state: State) -> None:
@@ -84,4 +86,8 @@ class StiffnessSolver(ABC):
     @property
     @abstractmethod
     def negative_pivots(self) -> int | None:
-        """Number of negative eigenvalues of the stiffness taken last, ``None`` where the solver cannot tell."""
+        """Number of negative eigenvalues of the stiffness taken last, ``None`` where it is not known by now."""
+
+    def inertia(self) -> int | None:
+        """Return the number of negative eigenvalues of the stiffness taken last, ``None`` if it cannot be found."""
+        return self.negative_pivots

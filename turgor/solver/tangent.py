@@ -153,8 +153,12 @@ class Tangent:
 
     @property
     def negative_pivots(self) -> int | None:
-        """Number of negative eigenvalues, ``None`` if the solver cannot tell; of the tangent made last only."""
+        """Number of negative eigenvalues, ``None`` if it is not known by now; of the tangent made last only."""
         return self.linear.negative_pivots
+
+    def inertia(self) -> int | None:
+        """Return the number of negative eigenvalues, ``None`` if the solver cannot tell; of the tangent made last."""
+        return self.linear.inertia()
 
     def solved(self, residual: Floats, pending: Floats | None) -> Step:
         """Return Newton's step from the state of the tangent, the `pending` given displacements imposed with it."""
@@ -193,7 +197,7 @@ class Tangent:
 
     def is_near(self, state: State) -> bool:
         """Whether the tangent speaks for a state, too, or has nothing to say."""
-        if self.negative_pivots is None and self._control is None:
+        if not self.linear.tells_inertia and self._control is None:
             return True
         away = float(np.linalg.norm(state.u - self.state.u))
         return self.residual <= NEAR or away <= NEARBY * float(np.linalg.norm(state.u))
