@@ -25,8 +25,8 @@ SURE = 0.5
 ENOUGH = 12
 """The least eigenvalue counts as found where its equation leaves this part of it, after so many directions at least.
 
-Among those of an indefinite matrix one of negative energy was found after eight at most: columns of two meshes next to
-their buckling loads and far beyond, six random vectors each.
+Of indefinite matrices the first eight at most had negative energies among them: columns of two meshes next to their
+buckling loads and far beyond, six random vectors each.
 """
 
 CANCELLED = 0.7
@@ -88,25 +88,20 @@ def softest(preconditioner: Preconditioner, n: int, most: int) -> tuple[Floats, 
     """
     start = np.random.default_rng(0).standard_normal(n)
     space = _Krylov(preconditioner, start / _length(start), most)
-    onto = np.zeros((most + 1, most))
-    for step in range(most):
+    for k in range(1, most + 1):
         left = float(space.grow()[-1])
-        k = step + 1
-        # The products of all directions with the basis give the energies.
-        onto[: k + 1, step] = _products(space.basis[: k + 1], space.improved[step])
-        onto[k, :step] = _products(space.improved[:step], space.basis[k])
-        energy = onto[: k + 1, :k].T @ space.columns[: k + 1, :k]
-        sizes = np.sqrt(np.abs(np.diag(energy)))
-        if not np.linalg.eigvalsh((energy + energy.T) / np.outer(sizes, sizes))[0] > 0.0:
-            return None
         if k < ENOUGH:
             continue
         values, vectors = np.linalg.eig(space.columns[:k, :k])
         least = int(np.argmin(values.real))
-        if left * abs(vectors[-1, least]) <= SURE * values[least].real:
+        if left * abs(vectors[-1, least]) <= SURE * abs(values[least].real):
+            energies = space.improved[:k] @ space.basis[: k + 1].T @ space.columns[: k + 1, :k]
+            sizes = np.sqrt(np.abs(np.diag(energies)))
+            if not np.linalg.eigvalsh((energies + energies.T) / np.outer(sizes, sizes))[0] > 0.0:
+                return None
             weights, direction = vectors[:, least].real, np.zeros(n)
             _add_combined(space.improved, weights, direction)
-            return direction, float(weights @ energy @ weights)
+            return direction, float(weights @ energies @ weights)
     return None
 
 
