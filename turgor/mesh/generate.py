@@ -96,44 +96,63 @@ def generate(
     MissingPackageError
         If gmsh or a system library that it loads is absent.
     """
-    default = actuator.default_size
-    chosen = default if size is None else size
-    for key, value in {"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}}.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError("the element size must be positive", key=key, value=value)
-    kinds = KINDS[2 if actuator.section else 3]
-    if cells is not None and cells not in kinds:
-        problem = "a plane shape has no such cells" if actuator.section else "a shape in space has no such cells"
-        raise InputError(problem, key="cells", value=cells, expected=" or ".join(kinds))
-    if cells == kinds[1]:
+    chosen = actuator.default_size if size is None else size
+    _check_sizes({"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}})
+    if _in_rows(actuator, cells):
         if layers is not None:
             problem = "layers are for tetrahedra; rows follow the size"
             raise InputError(problem, key="layers", value=layers, expected="size or sizes")
         progress(f"meshing in rows with elements of {chosen:g} mm")
         return _structured(actuator, chosen, sizes, per_circle)
     with cad.session(actuator.template) as gmsh:
-        progress("drawing")
-        shape = actuator.draw()
-        scale = min(1.0, chosen / default)
-        local = {**{name: scale * value for name, value in shape.sizes.items()}, **(sizes or {})}
-        limits = _local_sizes(gmsh, shape, local)
-        _check_count(gmsh, shape, chosen)
-        circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
-        circle = circle if per_circle is None else per_circle
+        return _unstructured(gmsh, actuator, chosen, sizes or {}, per_circle, layers, progress)
 
-        def meshed(*further: int) -> Mesh:
-            progress(f"meshing with elements of {chosen:g} mm")
-            _set_smallest(gmsh, [*limits, *further])
-            _divide(gmsh, chosen, circle, shape.dimension)
-            progress("curving")
-            return _named_mesh(gmsh, shape, _curved(gmsh, shape))
 
-        if layers is None:
-            return meshed()
-        check_layers(layers, shape.dimension)
-        progress("measuring walls")
-        _divide(gmsh, chosen, circle, 2)
-        return with_layers(gmsh, shape, chosen, layers, MOST_CELLS, meshed)
+def _check_sizes(sizes: Mapping[str, float]) -> None:
+    for key, value in sizes.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError("the element size must be positive", key=key, value=value)
+
+
+def _in_rows(actuator: Actuator, cells: str | None) -> bool:
+    """Whether cells in rows are asked for."""
+    kinds = KINDS[2 if actuator.section else 3]
+    if cells is not None and cells not in kinds:
+        problem = "a plane shape has no such cells" if actuator.section else "a shape in space has no such cells"
+        raise InputError(problem, key="cells", value=cells, expected=" or ".join(kinds))
+    return cells == kinds[1]
+
+
+def _unstructured(
+    gmsh: ModuleType,
+    actuator: Actuator,
+    size: float,
+    sizes: Mapping[str, float],
+    per_circle: int | None,
+    layers: int | None,
+    progress: Progress,
+) -> Mesh:
+    progress("drawing")
+    shape = actuator.draw()
+    scale = min(1.0, size / actuator.default_size)
+    limits = _local_sizes(gmsh, shape, {**{name: scale * local for name, local in shape.sizes.items()}, **sizes})
+    _check_count(gmsh, shape, size)
+    circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
+    circle = circle if per_circle is None else per_circle
+
+    def meshed(*further: int) -> Mesh:
+        progress(f"meshing with elements of {size:g} mm")
+        _set_smallest(gmsh, [*limits, *further])
+        _divide(gmsh, size, circle, shape.dimension)
+        progress("curving")
+        return _named_mesh(gmsh, shape, _curved(gmsh, shape))
+
+    if layers is None:
+        return meshed()
+    check_layers(layers, shape.dimension)
+    progress("measuring walls")
+    _divide(gmsh, size, circle, 2)
+    return with_layers(gmsh, shape, size, layers, MOST_CELLS, meshed)
 
 
 def _structured(actuator: Actuator, size: float, sizes: Mapping[str, float] | None, per_circle: int | None) -> Mesh:
