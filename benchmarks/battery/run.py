@@ -48,6 +48,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=300.0, help="processor seconds of a case on each thread")
     parser.add_argument("--most-cells", type=int, default=6000, help="larger meshes are made coarser")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--linear", default="auto", help="auto, direct or iterative")
     parser.add_argument("--again", action="store_true", help="run cases anew that the file has already")
     parser.add_argument("--compare", nargs=2, type=Path, metavar=("OLD", "NEW"))
     asked = parser.parse_args()
@@ -60,7 +61,7 @@ def main() -> None:
     for seed in range(int(first), int(end or int(first) + 1)):
         if seed in done and not asked.again:
             continue
-        done[seed] = run_case(seed, asked.most_cells, asked.limit, asked.threads)
+        done[seed] = run_case(seed, asked.most_cells, asked.limit, asked.threads, asked.linear)
         with asked.out.open("a") as out:
             out.write(json.dumps(done[seed]) + "\n")
         print(seed, done[seed]["outcome"], f"{done[seed]['cpu_s']:.0f} s", file=sys.stderr)
@@ -69,11 +70,11 @@ def main() -> None:
     print(text)
 
 
-def run_case(seed: int, most_cells: int, limit: float, threads: int) -> dict[str, Any]:
+def run_case(seed: int, most_cells: int, limit: float, threads: int, linear: str) -> dict[str, Any]:
     """Run one case in a process of its own, which dies when its processor time is used up."""
     names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
     environment = os.environ | dict.fromkeys(names, str(threads))
-    command = [sys.executable, str(HERE / "worker.py"), str(seed), str(most_cells), str(int(limit * threads))]
+    command = [sys.executable, str(HERE / "worker.py"), str(seed), str(most_cells), str(int(limit * threads)), linear]
     begun = time.perf_counter()
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode == 0:

@@ -1,6 +1,6 @@
 """Run one case of the battery in this process and print what became of it as one line of JSON.
 
-.venv/bin/python benchmarks/battery/worker.py SEED MOST_CELLS
+.venv/bin/python benchmarks/battery/worker.py SEED MOST_CELLS SECONDS LINEAR
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.materials.library import get
 from turgor.mesh import Mesh
-from turgor.solver.newton import Equilibrium
-from turgor.solver.path import LimitPressureError, StoppedShortError, output_fractions, solve_path
+from turgor.solver.newton import Equilibrium, NewtonOptions
+from turgor.solver.path import LimitPressureError, PathOptions, StoppedShortError, output_fractions, solve_path
 
 
 def main() -> None:
@@ -37,7 +37,7 @@ def main() -> None:
     case = random_case(seed)
     result: dict[str, Any] = {}
     try:
-        result |= outcome(case, most_cells)
+        result |= outcome(case, most_cells, PathOptions(NewtonOptions(linear=sys.argv[4])))  # type: ignore[arg-type]
     except InputError as error:
         result |= {"outcome": "refused", "reason": str(error)}
     except Exception as error:  # noqa: BLE001  (whatever escapes is what the battery looks for)
@@ -45,7 +45,7 @@ def main() -> None:
     print("\n" + json.dumps(result | {"cpu_s": time.process_time()}, default=str))
 
 
-def outcome(case: Case, most_cells: int) -> dict[str, Any]:
+def outcome(case: Case, most_cells: int, options: PathOptions) -> dict[str, Any]:
     """Mesh, inflate and judge."""
     mesh = mesh_of(case, most_cells)
     target = case.level * case.slenderness * get(case.materials[0]).shear_modulus
@@ -54,7 +54,7 @@ def outcome(case: Case, most_cells: int) -> dict[str, Any]:
     found: list[Equilibrium] = []
     begun = time.perf_counter()
     try:
-        solve_path(system, output_fractions(case.steps), on_equilibrium=found.append)
+        solve_path(system, output_fractions(case.steps), options=options, on_equilibrium=found.append)
         verdict = {"outcome": "reached"}
     except LimitPressureError as error:
         verdict = {"outcome": "limit" if limit_is_confirmed(system, error) else "failed", "reason": str(error)}
