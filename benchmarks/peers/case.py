@@ -65,8 +65,9 @@ class Case:
         return self.points.shape[1]
 
     @property
-    def is_hexahedral(self) -> bool:
-        return self.cells.shape[1] == len(HEX27)
+    def is_of_rows(self) -> bool:
+        """Whether the cells are hexahedra or quadrilaterals, which lie in rows."""
+        return self.cells.shape[1] in NODES
 
     @property
     def is_axisymmetric(self) -> bool:
@@ -114,3 +115,6 @@ CUBE_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0
 CUBE_FACES = [(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)]
 HEX27 = np.vstack([CUBE, *(CUBE[list(part)].mean(axis=0) for part in (*CUBE_EDGES, *CUBE_FACES, range(8)))])
 """The nodes of a hexahedron in the unit cube, in VTK order: corners, middles of the edges, of the faces, its own."""
+
+NODES = {27: HEX27, 9: HEX27[[0, 1, 2, 3, 8, 9, 10, 11, 24], :2]}
+"""The nodes of a cell that is a product of lines, by their number, where it is the unit cube or square."""

@@ -101,6 +101,7 @@ CASES = {
     "tube-quarter": Maker(quarter_tube, (5.0, 3.0, 2.0)),
     "tube-hexahedra": Maker(hexahedral_tube, (40.0, 10.0, 5.0)),
     "tube-section": Maker(tube_section, (1.6, 0.8, 0.4)),
+    "tube-section-quads": Maker(partial(tube_section, cells="quadrilaterals"), (1.6, 0.8, 0.4)),
     "punch": Maker(punch, (0.125, 0.0625, 0.03125)),
     "punch-quads": Maker(partial(punch, cell_type="quad9"), (0.125, 0.0625, 0.03125)),
     "bellows": Maker(bellows, (0.8, 0.4, 0.2)),

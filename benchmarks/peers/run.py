@@ -36,6 +36,9 @@ ONCE_S = 120
 SIMPLICES = ("tube", "tube-quarter", "tube-section", "punch", "bellows")
 """The cases of tetrahedra and triangles."""
 
+IN_ROWS = ("tube-hexahedra", "tube-section-quads", "punch-quads")
+"""Those of hexahedra and quadrilaterals."""
+
 IN_SPACE = ("tube", "tube-quarter", "tube-hexahedra")
 
 
@@ -71,9 +74,9 @@ class Peer:
 PEERS = {
     "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",), cases=tuple(CASES)),
     "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=IN_SPACE),
-    "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",), cases=(*SIMPLICES, "tube-hexahedra")),
+    "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",), cases=(*SIMPLICES, *IN_ROWS)),
     "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
-    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", cases=(*SIMPLICES, "tube-hexahedra")),
+    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", cases=(*SIMPLICES, *IN_ROWS)),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),
     "dolfinx-p2p1": Peer("DOLFINx, P2–P1", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P1",)),
     "dolfinx-q2p1": Peer(
@@ -82,7 +85,7 @@ PEERS = {
         "dolfinx",
         ranks=2,
         arguments=("Q2-P1disc",),
-        cases=("punch-quads", "tube-hexahedra"),
+        cases=IN_ROWS,
     ),
     "dolfinx-q2p1-space": Peer(
         "DOLFINx, Q2–P1space",
@@ -90,7 +93,7 @@ PEERS = {
         "dolfinx",
         ranks=2,
         arguments=("Q2-P1space",),
-        cases=("tube-hexahedra",),
+        cases=IN_ROWS,
     ),
     "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
 }

@@ -34,6 +34,8 @@ LADDERS = {
     "tube": (6.0, 5.0, 4.0, 3.5, 3.0, 2.5, 2.0, 1.75, 1.5),
     "tube-quarter": (6.0, 5.0, 4.0, 3.5, 3.0, 2.5, 2.0, 1.75, 1.5, 1.25),
     "tube-hexahedra": (40.0, 20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 1.75),
+    "tube-section": (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.75, 1.25, 0.8),
+    "tube-section-quads": (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.75, 1.25, 0.8),
 }
 """Case → element sizes in mm."""
 
@@ -101,7 +103,7 @@ def climb(case: str, name: str) -> list[tuple[float, dict[str, object]]]:
     for size in LADDERS[case]:
         run = measured(PEERS[name], mesh(case, size), mesh(case, LADDERS[case][0]))
         rungs.append((size, run))
-        found = run.get("failure") or f"{amount(run, 'tip'):.5f} mm, {error(run):+.2%}, {run['wall_s']:.2f} s"
+        found = run.get("failure") or f"{amount(run, 'tip'):.5f} mm, {error(run):+.2%}, {run['wall_s']:.3f} s"
         print(case, name, size, found, file=sys.stderr)
         if "failure" in run or (len(rungs) > 1 and all(abs(error(run)) <= WITHIN for _, run in rungs[-2:])):
             break
@@ -135,8 +137,8 @@ def row(case: str, name: str, rung: tuple[float, dict[str, object]] | None, runs
         f"{amount(run, 'tip'):.5f}",
         f"{100 * error(run):+.2f} %",
         str(len(runs)),
-        f"{median(runs, 'wall_s'):.2f}",
-        f"{median(runs, 'cpu_s'):.2f}",
+        f"{median(runs, 'wall_s'):.3f}",
+        f"{median(runs, 'cpu_s'):.3f}",
     ]
     return "| " + " | ".join(figures) + " |"
 

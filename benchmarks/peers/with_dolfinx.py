@@ -31,14 +31,17 @@ corners row by row."""
 
 LAGRANGE = basix.ElementFamily.P, basix.CellType.hexahedron, 2, basix.LagrangeVariant.equispaced
 CELL_NODES[27] = [int(np.argmin(np.abs(HEX27 - place).sum(axis=1))) for place in basix.create_element(*LAGRANGE).points]
-HEX27_FACES = np.array(CELL_NODES[27])[np.array(basix.topology(basix.CellType.hexahedron)[2])]
+FACES = {
+    27: np.array(CELL_NODES[27])[np.array(basix.topology(basix.CellType.hexahedron)[2])],
+    9: np.array(CELL_NODES[9])[np.array(basix.topology(basix.CellType.quadrilateral)[1])],
+}
 
 CELLS = {10: "tetrahedron", 6: "triangle", 9: "quadrilateral", 27: "hexahedron"}
 DEGREES = {10: 2, 6: 2, 9: 5, 27: 5}
 """Of the integration rule: four, three, nine and 27 points."""
 
 COMPILED = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
-PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1), "Q2-P1space": ("DG", 0, (4,))}
+PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1), "Q2-P1space": ("DG", 0)}
 """The last two are linear in the coordinates of the reference cell, and in those of space, as in Turgor."""
 
 MUMPS = {
@@ -56,8 +59,9 @@ comm = MPI.COMM_WORLD
 def solve(case: Case) -> Solved:
     mesh, cavity = curved_mesh(case)
     name = sys.argv[3]
-    family, degree, *shape = PRESSURES[name]
-    pressures = basix.ufl.element(family, cell_of(case), degree, shape=shape[0] if shape else None)
+    family, degree = PRESSURES[name]
+    shape = (1 + case.dimension,) if name == "Q2-P1space" else None
+    pressures = basix.ufl.element(family, cell_of(case), degree, shape=shape)
     space = fem.functionspace(mesh, basix.ufl.mixed_element([quadratic(case), pressures]))
     solution = fem.Function(space)
     force, tangent = forms(case, solution, mesh, cavity)
@@ -87,7 +91,7 @@ def curved_mesh(case: Case) -> tuple[dolfinx.mesh.Mesh, np.ndarray]:
     mesh = dolfinx.mesh.create_mesh(comm, cells, quadratic(case), points)
     if not case.has_cavity:
         return mesh, np.empty((0, 2), np.int32)
-    host, face = case.hosts(HEX27_FACES if case.is_hexahedral else OPPOSITE[case.dimension])
+    host, face = case.hosts(FACES.get(case.cells.shape[1], OPPOSITE[case.dimension]))
     owned = np.asarray(mesh.topology.original_cell_index)[: mesh.topology.index_map(case.dimension).size_local]
     here = np.full(len(case.cells), -1, dtype=np.int32)
     here[owned] = np.arange(len(owned))
@@ -126,7 +130,7 @@ def forms(case: Case, solution: fem.Function, mesh: dolfinx.mesh.Mesh, cavity: n
     potential = depth(case, mesh) * energy * dx
     if case.has_cavity:
         # Exact: what is integrated is of this degree along the faces.
-        degree = 5 if case.is_axisymmetric or case.is_hexahedral else 4
+        degree = 5 if case.is_axisymmetric or case.is_of_rows else 4
         ds = ufl.Measure("ds", mesh, subdomain_data=[(1, cavity.ravel())], metadata={"quadrature_degree": degree})
         x, area = ufl.SpatialCoordinate(mesh) + u, ufl.cofac(in_plane) * ufl.FacetNormal(mesh)
         flux = ufl.pi * x[0] ** 2 * area[0] if case.is_axisymmetric else ufl.dot(x, area) / 3
@@ -160,13 +164,14 @@ def quadratic(case: Case) -> basix.ufl._ElementBase:
 
 
 def field_of(p: ufl.core.expr.Expr, mesh: dolfinx.mesh.Mesh) -> ufl.core.expr.Expr:
-    """Return the pressure of its unknowns: four constants of a cell stand for 1, x, y and z about its middle."""
+    """Return the pressure of its unknowns: constants of a cell stand for 1, x, y (and z) about its middle."""
     if not p.ufl_shape:
         return p
-    middle = fem.Function(fem.functionspace(mesh, ("DG", 0, (3,))))
-    middle.interpolate(lambda x: x)
+    d = mesh.geometry.dim
+    middle = fem.Function(fem.functionspace(mesh, ("DG", 0, (d,))))
+    middle.interpolate(lambda x: x[:d])
     local = ufl.SpatialCoordinate(mesh) - middle
-    return p[0] + sum(p[i + 1] * local[i] for i in range(3))
+    return p[0] + sum(p[i + 1] * local[i] for i in range(d))
 
 
 def size_of_volume(case: Case, mesh: dolfinx.mesh.Mesh, pressures: basix.ufl._ElementBase) -> float:

@@ -1,12 +1,12 @@
 """FElupe: `SolidBodyNearlyIncompressible` on quadratic simplices, Newton in one load step, PARDISO (pypardiso).
 
-Its best settings of those tried (third argument `mixed`). The nearly incompressible body keeps a mean pressure for
-each cell and condenses it, the same discretisation as Turgor's; its three-field form would solve a larger, indefinite
+Its best settings of those tried (third argument `mixed`). The nearly incompressible body keeps a mean pressure for each
+cell and condenses it, the same discretisation as Turgor's; its three-field form would solve a larger, indefinite
 matrix. The linear solver is pypardiso instead of SciPy's SuperLU, as FElupe's documentation advises, in symmetric mode,
 which halves the work of its default. Assembly has `parallel=True` and two threads. FElupe has no boundary region for
-quadratic simplices; `CavityFaces` is one, built as FElupe's own regions are. In hexahedra the body is Q2–P0, one mean
-pressure to a cell being all it has. `displacement` takes its plain
-`SolidBody`, to show what locking does to a punch; it finds no way in ten steps, so it takes 20.
+quadratic simplices; `CavityFaces` is one, built as FElupe's own regions are. In hexahedra and quadrilaterals the body
+is Q2–P0, one mean pressure to a cell being all it has. `displacement` takes its plain `SolidBody`, to show what locking
+does to a punch; it finds no way in ten steps, so it takes 20.
 """
 
 from __future__ import annotations
@@ -43,6 +43,10 @@ class QuadraticTriangle(fem.QuadraticTriangle):
 ELEMENTS = {3: fem.QuadraticTetra(), 2: QuadraticTriangle()}
 RULES = {3: fem.TetrahedronQuadrature(order=2), 2: fem.TriangleQuadrature(order=2)}
 CELL_TYPES = {3: "tetra10", 2: "triangle6"}
+OF_ROWS = {
+    3: ("hexahedron27", fem.RegionTriQuadraticHexahedron, fem.RegionTriQuadraticHexahedronBoundary),
+    2: ("quad9", fem.RegionBiQuadraticQuad, fem.RegionBiQuadraticQuadBoundary),
+}
 FACE_RULES = {3: fem.TriangleQuadrature(order=5), 2: fem.GaussLegendre(order=2, dim=1)}
 FIELDS = {"space": fem.Field, "plane-strain": fem.FieldPlaneStrain, "axisymmetric": fem.FieldAxisymmetric}
 
@@ -70,7 +74,7 @@ def solve(case: Case) -> Solved:
             )
         iterations += newton.iterations
     pardiso.free_memory(everything=True)
-    order = "Q2" if case.is_hexahedral else "P2"
+    order = "Q2" if case.is_of_rows else "P2"
     counted = "1 step" if steps == 1 else f"{steps} steps"
     return Solved(
         tip=tuple((turn @ field[0].values[case.tip]).tolist()),
@@ -88,8 +92,9 @@ def bodies(
 ) -> tuple[fem.FieldContainer, fem.SolidBody | fem.SolidBodyNearlyIncompressible, list[fem.SolidBodyPressure]]:
     """Return the displacement, the solid and what presses on it; `points` are in FElupe's axes."""
     d = case.dimension
-    if case.is_hexahedral:
-        region = fem.RegionTriQuadraticHexahedron(fem.Mesh(points, case.cells, "hexahedron27"))
+    if case.is_of_rows:
+        name, whole, boundary = OF_ROWS[d]
+        region = whole(fem.Mesh(points, case.cells, name))
     else:
         region = fem.Region(fem.Mesh(points, case.cells, CELL_TYPES[d]), ELEMENTS[d], RULES[d])
     field = fem.FieldContainer([FIELDS[case.kind](region, dim=d)])
@@ -99,8 +104,10 @@ def bodies(
         solid = fem.SolidBody(fem.NeoHooke(mu=case.mu, bulk=case.bulk, parallel=True), field)
     if not case.has_cavity:
         return field, solid, []
-    if case.is_hexahedral:
-        cavity = fem.RegionTriQuadraticHexahedronBoundary(region.mesh, mask=np.unique(case.surfaces["cavity"]))
+    if case.is_of_rows:
+        cavity = boundary(region.mesh, mask=np.unique(case.surfaces["cavity"]))
+        if d == 2:
+            cavity.normals = np.concatenate([cavity.normals, np.zeros_like(cavity.normals[:1])])
     else:
         cavity = CavityFaces(case, points)
     faces = fem.FieldContainer([FIELDS[case.kind](cavity, dim=d)])

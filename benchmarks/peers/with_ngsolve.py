@@ -14,7 +14,7 @@ import itertools
 import netgen.meshing
 import ngsolve as ng
 import numpy as np
-from case import CUBE, HEX27, Case
+from case import NODES, Case
 from measure import Newton, Solved, run
 
 CELL_NODES = {3: [0, 1, 2, 3, 4, 6, 7, 5, 8, 9], 2: [0, 1, 2, 4, 5, 3]}
@@ -23,8 +23,11 @@ CELL_NODES = {3: [0, 1, 2, 3, 4, 6, 7, 5, 8, 9], 2: [0, 1, 2, 4, 5, 3]}
 FACE_NODES = {3: CELL_NODES[2], 2: [0, 1, 2]}
 
 
-CORNER_SHAPES = np.prod(np.where(CUBE == 1, HEX27[:, None], 1 - HEX27[:, None]), axis=2)
-"""The trilinear shape functions of a hexahedron's corners at all its nodes."""
+CORNER_SHAPES = {
+    number: np.prod(np.where(nodes[: 2 ** nodes.shape[1]] == 1, nodes[:, None], 1 - nodes[:, None]), axis=2)
+    for number, nodes in NODES.items()
+}
+"""The multilinear shape functions of the corners of a hexahedron or quadrilateral at all its nodes."""
 
 
 def gauss(dimension: int) -> ng.IntegrationRule:
@@ -42,6 +45,7 @@ RULES = {
         [(FAR, NEAR, NEAR), (NEAR, FAR, NEAR), (NEAR, NEAR, FAR), (NEAR, NEAR, NEAR)], [1 / 24] * 4
     ),
     ng.ET.HEX: gauss(3),
+    ng.ET.QUAD: gauss(2),
     ng.ET.TRIG: ng.IntegrationRule([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6] * 3),
 }
 """The rules of degree 2, which Turgor and FElupe use; NGSolve's own choice takes more points."""
@@ -55,7 +59,7 @@ def solve(case: Case) -> Solved:
         for i, axis in enumerate(axes)
     }
     constant = ng.L2(mesh, order=0)
-    space = ng.VectorH1(mesh, order=2, **held) * (constant**4 if case.is_hexahedral else constant)
+    space = ng.VectorH1(mesh, order=2, **held) * (constant ** (1 + case.dimension) if case.is_of_rows else constant)
     form = potential(case, space)
     solution, given = ng.GridFunction(space), ng.GridFunction(space)
     for name, value in case.held.items():
@@ -69,15 +73,15 @@ def solve(case: Case) -> Solved:
         unknowns=int(np.sum(list(solver.coupling))),
         iterations=solver.newton.iterations,
         factorisations=solver.newton.iterations,
-        settings=f"{'Q2–P1disc' if case.is_hexahedral else 'P2–P0'} mixed, condensed; 1 step; sparsecholesky",
+        settings=f"{'Q2–P1disc' if case.is_of_rows else 'P2–P0'} mixed, condensed; 1 step; sparsecholesky",
         version=ng.__version__,
     )
 
 
 def curved_mesh(case: Case) -> ng.Mesh:
     """Return the mesh with its middle nodes; Netgen wants the corners numbered first."""
-    if case.is_hexahedral:
-        return hexahedral_mesh(case)
+    if case.is_of_rows:
+        return mesh_of_rows(case)
     d = case.dimension
     corner = np.zeros(len(case.points), dtype=bool)
     corner[case.cells[:, : d + 1]] = True
@@ -97,28 +101,32 @@ def curved_mesh(case: Case) -> ng.Mesh:
     return ng.Mesh(mesh)
 
 
-def hexahedral_mesh(case: Case) -> ng.Mesh:
-    """Return the mesh of the corners, deformed so that all 27 nodes of each cell are in their places.
+def mesh_of_rows(case: Case) -> ng.Mesh:
+    """Return the mesh of the corners, deformed so that all 27 (or nine) nodes of each cell are in their places.
 
     Netgen has no such cell, and NGSolve none of its curved ones in spaces.
     """
-    corners = np.unique(case.cells[:, :8])
-    mesh = netgen.meshing.Mesh(dim=3)
-    mesh.AddPoints(case.points[corners])
+    d, count = case.dimension, case.cells.shape[1]
+    corners = np.unique(case.cells[:, : 2**d])
+    mesh = netgen.meshing.Mesh(dim=d)
+    mesh.AddPoints(np.pad(case.points[corners], ((0, 0), (0, 3 - d))))
+    if d == 2:
+        mesh.Add(netgen.meshing.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
     for number, (name, faces) in enumerate(case.surfaces.items(), start=1):
-        mesh.Add(netgen.meshing.FaceDescriptor(surfnr=number, domin=1, domout=0, bc=number))
+        if d == 3:
+            mesh.Add(netgen.meshing.FaceDescriptor(surfnr=number, domin=1, domout=0, bc=number))
         mesh.SetBCName(number - 1, name)
-        quadrilaterals = np.searchsorted(corners, faces[:, :4]).astype(np.int32)
-        mesh.AddElements(dim=2, index=number, data=quadrilaterals, base=0)
-    mesh.AddElements(dim=3, index=1, data=np.searchsorted(corners, case.cells[:, :8]).astype(np.int32), base=0)
+        sides = np.searchsorted(corners, faces[:, : 2 ** (d - 1)]).astype(np.int32)
+        mesh.AddElements(dim=d - 1, index=number, data=sides, base=0)
+    mesh.AddElements(dim=d, index=1, data=np.searchsorted(corners, case.cells[:, : 2**d]).astype(np.int32), base=0)
     mesh = ng.Mesh(mesh)
     space = ng.H1(mesh, order=2)
     elements = list(space.Elements())
     # Bubbles of second order are the same from whichever end, so that one matrix serves all cells.
     first = space.GetFE(ng.ElementId(ng.VOL, 0))
-    shapes = np.array([first.CalcShape(*place) for place in HEX27])
+    shapes = np.array([first.CalcShape(*place) for place in NODES[count]])
     dofs = np.array([element.dofs for element in elements])
-    straight = np.einsum("an,mni->mai", CORNER_SHAPES, case.points[case.cells[:, :8]])
+    straight = np.einsum("an,mni->mai", CORNER_SHAPES[count], case.points[case.cells[:, : 2**d]])
     deformation = ng.GridFunction(ng.VectorH1(mesh, order=2))
     coefficients = np.linalg.solve(shapes, case.points[case.cells] - straight)
     for i, component in enumerate(deformation.components):
@@ -128,12 +136,12 @@ def hexahedral_mesh(case: Case) -> ng.Mesh:
 
 
 def pressure(case: Case, p: ng.CoefficientFunction, mesh: ng.Mesh) -> ng.CoefficientFunction:
-    """Return the pressure: in hexahedra one that is linear in x, y and z, as in Turgor, from its four unknowns."""
-    if not case.is_hexahedral:
+    """Return the pressure: in cells that lie in rows one that is linear in the coordinates, as in Turgor."""
+    if not case.is_of_rows:
         return p
     volumes = ng.Integrate(ng.CF(1), mesh, element_wise=True).NumPy()
     value = p[0]
-    for i, along in enumerate((ng.x, ng.y, ng.z), start=1):
+    for i, along in enumerate((ng.x, ng.y, ng.z)[: case.dimension], start=1):
         middle = ng.GridFunction(ng.L2(mesh, order=0))
         middle.vec.FV().NumPy()[:] = ng.Integrate(along, mesh, element_wise=True).NumPy() / volumes
         value += p[i] * (along - middle)
@@ -159,7 +167,7 @@ def potential(case: Case, space: ng.FESpace) -> ng.BilinearForm:
             x, gradient = place + u, ng.Grad(place).Trace() + ng.Grad(u).Trace()
         area = ng.Cof(gradient) * ng.specialcf.normal(case.dimension)
         flux = np.pi * x[0] ** 2 * area[0] if case.is_axisymmetric else ng.InnerProduct(x, area) / 3
-        rules = {"intrules": {ng.ET.QUAD: gauss(2)}} if case.is_hexahedral else {}
+        rules = {"intrules": {ng.ET.QUAD: gauss(2)}} if case.is_of_rows and case.dimension == 3 else {}
         form += ng.Variation(case.pressure * flux * ng.ds("cavity", **rules))
     return form
 

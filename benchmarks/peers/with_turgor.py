@@ -2,7 +2,7 @@
 
 The element is P2–P0, of quadrilaterals and hexahedra Q2–P1disc. `direct` condenses the pressures and factorises with
 PARDISO, its default at these sizes; `iterative`, for bodies in space, keeps them as unknowns of a Krylov
-method, and does not tell whether the state is stable, as the peers do not.
+method. Both tell whether the state is stable, which the peers do not.
 """
 
 from __future__ import annotations
