@@ -96,7 +96,9 @@ def generate(
     MissingPackageError
         If gmsh or a system library that it loads is absent.
     """
-    chosen = actuator.default_size if size is None else size
+    # A shape from a file opens a session of its own to find its size.
+    default = actuator.default_size
+    chosen = default if size is None else size
     _check_sizes({"size": chosen, **{f"sizes.{name}": local for name, local in (sizes or {}).items()}})
     if _in_rows(actuator, cells):
         if layers is not None:
@@ -105,7 +107,12 @@ def generate(
         progress(f"meshing in rows with elements of {chosen:g} mm")
         return _structured(actuator, chosen, sizes, per_circle)
     with cad.session(actuator.template) as gmsh:
-        return _unstructured(gmsh, actuator, chosen, sizes or {}, per_circle, layers, progress)
+        progress("drawing")
+        shape = actuator.draw()
+        scale = min(1.0, chosen / default)
+        limits = {**{name: scale * local for name, local in shape.sizes.items()}, **(sizes or {})}
+        usual = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
+        return _unstructured(gmsh, shape, chosen, limits, usual if per_circle is None else per_circle, layers, progress)
 
 
 def _check_sizes(sizes: Mapping[str, float]) -> None:
@@ -125,25 +132,20 @@ def _in_rows(actuator: Actuator, cells: str | None) -> bool:
 
 def _unstructured(
     gmsh: ModuleType,
-    actuator: Actuator,
+    shape: Shape,
     size: float,
     sizes: Mapping[str, float],
-    per_circle: int | None,
+    per_circle: int,
     layers: int | None,
     progress: Progress,
 ) -> Mesh:
-    progress("drawing")
-    shape = actuator.draw()
-    scale = min(1.0, size / actuator.default_size)
-    limits = _local_sizes(gmsh, shape, {**{name: scale * local for name, local in shape.sizes.items()}, **sizes})
+    limits = _local_sizes(gmsh, shape, sizes)
     _check_count(gmsh, shape, size)
-    circle = actuator.per_circle if shape.dimension == 3 else PER_CIRCLE_OF_SECTION
-    circle = circle if per_circle is None else per_circle
 
     def meshed(*further: int) -> Mesh:
         progress(f"meshing with elements of {size:g} mm")
         _set_smallest(gmsh, [*limits, *further])
-        _divide(gmsh, size, circle, shape.dimension)
+        _divide(gmsh, size, per_circle, shape.dimension)
         progress("curving")
         return _named_mesh(gmsh, shape, _curved(gmsh, shape))
 
@@ -151,7 +153,7 @@ def _unstructured(
         return meshed()
     check_layers(layers, shape.dimension)
     progress("measuring walls")
-    _divide(gmsh, size, circle, 2)
+    _divide(gmsh, size, per_circle, 2)
     return with_layers(gmsh, shape, size, layers, MOST_CELLS, meshed)
 
 
