@@ -111,7 +111,7 @@ class Iterative(StiffnessSolver):
 
     @property
     def negative_pivots(self) -> int | None:
-        """Known where the stiffness had to be factorised, and by :meth:`inertia`."""
+        """Unknown, unless the stiffness had to be factorised; :meth:`inertia` finds it."""
         return self._factors().negative_pivots if self._factorised else None
 
     def inertia(self) -> int | None:

@@ -149,12 +149,7 @@ class Tangent:
             self._response = linear.solution(system, growing)
             self._measured = system.load_direction(state, control.weights)
             self.compliance = -float(np.vdot(self._measured, self._response.u))
-        progress.tangents.append((self.residual, self.negative_pivots or 0))
-
-    @property
-    def negative_pivots(self) -> int | None:
-        """Number of negative eigenvalues, ``None`` if it is not known by now; of the tangent made last only."""
-        return self.linear.negative_pivots
+        progress.tangents.append((self.residual, linear.negative_pivots or 0))
 
     def inertia(self) -> int | None:
         """Return the number of negative eigenvalues, ``None`` if the solver cannot tell; of the tangent made last."""
