@@ -306,17 +306,18 @@ def improving(matrix, inverse):
     return lambda x: (inverse @ x, matrix @ (inverse @ x))
 
 
-@pytest.mark.parametrize("accuracy", [2e-3, 1e-9])
+@pytest.mark.parametrize("accuracy", [2e-3, 1e-6])
 def test_solutions_are_as_accurate_as_asked_for(accuracy):
     system = tube(3.0)
-    state = system.consistent(0.01 * np.sin(system.mesh.points), np.array([0.015]))
     solver, exact = Iterative(system), direct(system)
-    for kind in (solver, exact):
-        kind.take_stiffness(system, state)
+    # The system keeps the matrix that was asked of it last.
+    for kind in (exact, solver):
+        kind.take_stiffness(system, system.reference_state())
     right = np.random.default_rng(0).standard_normal(system.n_dofs)
-    solution = exact.solve(right)
-    error = np.linalg.norm(solver.solution(system, right, accuracy).u - system.nodal(solution))
-    assert error < 30.0 * accuracy * np.linalg.norm(solution)
+    solution = system.nodal(exact.solve(right))
+    error = np.linalg.norm(solver.solution(system, right, accuracy).u - solution)
+    assert not solver._factorised
+    assert 0.0 < error < 30.0 * accuracy * np.linalg.norm(solution)
 
 
 def test_the_path_is_chosen_by_size(monkeypatch):
