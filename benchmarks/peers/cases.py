@@ -29,9 +29,7 @@ def tube(size: float) -> Case:
 
     The pressure is 58 % of its limit.
     """
-    mesh = turgor.CappedTube().mesh(size=f"{size} mm")
-    tip = int(mesh.markers["tip"][0])
-    return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
+    return whole(turgor.CappedTube().mesh(size=f"{size} mm"))
 
 
 def quarter_tube(size: float) -> Case:
@@ -40,8 +38,19 @@ def quarter_tube(size: float) -> Case:
 
 
 def hexahedral_tube(size: float) -> Case:
-    """The same quarter in rows of hexahedra, two at least along a quarter of a circle and one through the wall."""
+    """Case T in rows of hexahedra, eight at least along a circle and one through the wall."""
+    return whole(turgor.CappedTube().mesh(size=f"{size} mm", cells="hexahedra", per_circle=8))
+
+
+def hexahedral_quarter(size: float) -> Case:
+    """The quarter of that."""
     return quarter(turgor.CappedTube(model="quarter").mesh(size=f"{size} mm", cells="hexahedra", per_circle=8))
+
+
+def whole(mesh: Mesh) -> Case:
+    """Return the whole of case T as a case."""
+    tip = int(mesh.markers["tip"][0])
+    return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
 
 
 def quarter(mesh: Mesh) -> Case:
@@ -99,7 +108,8 @@ def case_of(
 CASES = {
     "tube": Maker(tube, (5.0, 3.0, 2.0)),
     "tube-quarter": Maker(quarter_tube, (5.0, 3.0, 2.0)),
-    "tube-hexahedra": Maker(hexahedral_tube, (40.0, 10.0, 5.0)),
+    "tube-hexahedra": Maker(hexahedral_tube, (40.0, 10.0, 7.0)),
+    "tube-quarter-hexahedra": Maker(hexahedral_quarter, (40.0, 10.0, 5.0)),
     "tube-section": Maker(tube_section, (1.6, 0.8, 0.4)),
     "tube-section-quads": Maker(partial(tube_section, cells="quadrilaterals"), (1.6, 0.8, 0.4)),
     "punch": Maker(punch, (0.125, 0.0625, 0.03125)),

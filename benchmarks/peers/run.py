@@ -36,10 +36,10 @@ ONCE_S = 120
 SIMPLICES = ("tube", "tube-quarter", "tube-section", "punch", "bellows")
 """The cases of tetrahedra and triangles."""
 
-IN_ROWS = ("tube-hexahedra", "tube-section-quads", "punch-quads")
+IN_ROWS = ("tube-hexahedra", "tube-quarter-hexahedra", "tube-section-quads", "punch-quads")
 """Those of hexahedra and quadrilaterals."""
 
-IN_SPACE = ("tube", "tube-quarter", "tube-hexahedra")
+IN_SPACE = ("tube", "tube-quarter", "tube-hexahedra", "tube-quarter-hexahedra")
 
 
 @dataclass(frozen=True)
