@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from case import Case
@@ -15,6 +16,9 @@ from turgor.mesh.structured import rectangle
 
 FREE = np.nan
 
+HEXAHEDRA = {"cells": "hexahedra", "per_circle": 8}
+"""Rows of them, eight at least along a circle and one through the wall."""
+
 
 @dataclass(frozen=True)
 class Maker:
@@ -24,46 +28,30 @@ class Maker:
     sizes: tuple[float, ...]
 
 
-def tube(size: float) -> Case:
+def tube(size: float, **meshing: Any) -> Case:
     """Case T: a tube of inner radius 6.35 mm, wall 3.5 mm and length 120 mm with solid caps of 17 mm, one end clamped.
 
     The pressure is 58 % of its limit.
     """
-    return whole(turgor.CappedTube().mesh(size=f"{size} mm"))
+    return tube_of("full", size, {"mount": (0.0, 0.0, 0.0)}, meshing)
 
 
-def quarter_tube(size: float) -> Case:
+def quarter_tube(size: float, **meshing: Any) -> Case:
     """The quarter x, y ≥ 0 of case T, whose cut faces slide."""
-    return quarter(turgor.CappedTube(model="quarter").mesh(size=f"{size} mm"))
-
-
-def hexahedral_tube(size: float) -> Case:
-    """Case T in rows of hexahedra, eight at least along a circle and one through the wall."""
-    return whole(turgor.CappedTube().mesh(size=f"{size} mm", cells="hexahedra", per_circle=8))
-
-
-def hexahedral_quarter(size: float) -> Case:
-    """The quarter of that."""
-    return quarter(turgor.CappedTube(model="quarter").mesh(size=f"{size} mm", cells="hexahedra", per_circle=8))
-
-
-def whole(mesh: Mesh) -> Case:
-    """Return the whole of case T as a case."""
-    tip = int(mesh.markers["tip"][0])
-    return case_of(mesh, "space", 0.1047, 1000.0, tip, {"mount": (0.0, 0.0, 0.0)}, pressure=0.02)
-
-
-def quarter(mesh: Mesh) -> Case:
-    """Return a quarter of case T as a case."""
     held = {"mount": (0.0, 0.0, 0.0), "symmetry-x": (0.0, FREE, FREE), "symmetry-y": (FREE, 0.0, FREE)}
-    return case_of(mesh, "space", 0.1047, 1000.0, int(mesh.markers["tip"][0]), held, pressure=0.02)
+    return tube_of("quarter", size, held, meshing)
 
 
 def tube_section(size: float, cells: str = "triangles") -> Case:
     """The section of case T through its axis."""
-    mesh = turgor.CappedTube(model="axisymmetric").mesh(size=f"{size} mm", cells=cells)
-    held = {"mount": (0.0, 0.0), "axis": (0.0, FREE)}
-    return case_of(mesh, "axisymmetric", 0.1047, 1000.0, int(mesh.markers["tip"][0]), held, pressure=0.02)
+    return tube_of("axisymmetric", size, {"mount": (0.0, 0.0), "axis": (0.0, FREE)}, {"cells": cells})
+
+
+def tube_of(model: str, size: float, held: dict[str, tuple[float, ...]], meshing: dict[str, Any]) -> Case:
+    """Return a model of case T, meshed as asked for."""
+    mesh = turgor.CappedTube(model=model).mesh(size=f"{size} mm", **meshing)
+    kind = "space" if mesh.dimension == 3 else model
+    return case_of(mesh, kind, 0.1047, 1000.0, int(mesh.markers["tip"][0]), held, pressure=0.02)
 
 
 def punch(size: float, cell_type: str = "tri6") -> Case:
@@ -108,8 +96,8 @@ def case_of(
 CASES = {
     "tube": Maker(tube, (5.0, 3.0, 2.0)),
     "tube-quarter": Maker(quarter_tube, (5.0, 3.0, 2.0)),
-    "tube-hexahedra": Maker(hexahedral_tube, (40.0, 10.0, 7.0)),
-    "tube-quarter-hexahedra": Maker(hexahedral_quarter, (40.0, 10.0, 5.0)),
+    "tube-hexahedra": Maker(partial(tube, **HEXAHEDRA), (40.0, 10.0, 7.0)),
+    "tube-quarter-hexahedra": Maker(partial(quarter_tube, **HEXAHEDRA), (40.0, 10.0, 5.0)),
     "tube-section": Maker(tube_section, (1.6, 0.8, 0.4)),
     "tube-section-quads": Maker(partial(tube_section, cells="quadrilaterals"), (1.6, 0.8, 0.4)),
     "punch": Maker(punch, (0.125, 0.0625, 0.03125)),
