@@ -25,10 +25,12 @@ def upper_pattern(matrix):
     return upper.indptr.astype(np.int32), upper.indices.astype(np.int32), upper.data
 
 
-@pytest.fixture
-def matrix():
+@pytest.fixture(params=["blocks", "entries"])
+def matrix(request):
+    # As of nodes with three unknowns each, which PARDISO takes together, or without any such order.
     rng = np.random.default_rng(0)
-    dense = rng.standard_normal((60, 60)) * (rng.random((60, 60)) < 0.1)
+    blocks = np.kron(rng.random((20, 20)) < 0.1, np.ones((3, 3)))
+    dense = rng.standard_normal((60, 60)) * (blocks if request.param == "blocks" else rng.random((60, 60)) < 0.1)
     return dense + dense.T + np.diag(rng.uniform(5, 10, 60))
 
 

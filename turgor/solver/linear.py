@@ -131,8 +131,8 @@ def warn_of_memory(needed_mb: float) -> None:
         )
 
 
-BY_DEGREE = 500_000
-"""Entries up to which unknowns are ordered by minimum degree, in half the time and with no more fill."""
+BLOCKS = 80
+"""Percent of their entries that rows must have in common to be one block: those of a node have all of them."""
 
 _SYMMETRIC_INDEFINITE = -2
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE_FACTORS, _RELEASE = 11, 22, 33, 0, -1
@@ -157,7 +157,6 @@ class Pardiso(LinearSolver):
         library = _mkl()
         assert library is not None
         self._pardiso = library.pardiso
-        self._threads = int(library.MKL_Get_Max_Threads())
         self._precision: type[np.floating] = np.float32 if single else np.float64
         self._release: Callable[[], object] = _nothing
         super().__init__(row_start, column)
@@ -174,12 +173,13 @@ class Pardiso(LinearSolver):
         # Left at zero, iterative refinement runs after perturbed pivots only.
         control = np.zeros(64, np.int32)
         control[0] = 1  # the entries below, not the defaults
-        control[1] = 3 if len(column) > BY_DEGREE else 0  # nested dissection in parallel, or minimum degree
+        control[1] = 3  # nested dissection, in parallel
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
         control[20] = 1  # Bunch–Kaufman pivots
-        control[23] = self._threads > 1  # in two levels, whose threads hardly wait for each other
+        control[23] = 1  # in two levels, whose threads hardly wait for each other
         control[27] = self._precision is np.float32  # single precision
         control[34] = 1  # indices from zero
+        control[36] = -BLOCKS  # blocks are found in the pattern: far less of it to order and to analyse
         self._control = control
 
     def factorise(self, values: Floats) -> None:
