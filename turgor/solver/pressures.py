@@ -57,6 +57,9 @@ class Pressures:
         self._weight = np.repeat(np.sqrt(modulus * np.cbrt(self._volume)), k)
         self._gradient = np.empty((m, k, 3 * n))
         _scale(inverse, gradient, self._places, self._free, self._gradient)
+        # Once more in the order of the nodes, where sums at nodes read it from end to end.
+        self._of_nodes = np.empty((len(self._elements), k, 3))
+        _sort(self._elements, self._corners, self._gradient, self._of_nodes)
 
     def of_lag(self, lags: Sequence[Floats]) -> Floats:
         """Return the pressures ``(m k,)`` that belong to dilatations ``(m, k)`` of each solid."""
@@ -66,7 +69,7 @@ class Pressures:
     def forces(self, q: Floats) -> Floats:
         """Return Bᵀ q, ``(3 n_nodes,)``."""
         out = np.empty(3 * (len(self._start) - 1))
-        _sum_forces(self._start, self._elements, self._corners, self._gradient, q, out)
+        _sum_forces(self._start, self._elements, self._of_nodes, q, out)
         return out
 
     def residual(self, u: Floats, q: Floats) -> Floats:
@@ -114,19 +117,29 @@ def _scale(inverse, gradient, places, free, out):  # type: ignore[no-untyped-def
 
 
 @parallel
-def _sum_forces(start, elements, corners, gradient, q, out):  # type: ignore[no-untyped-def]
+def _sort(elements, corners, gradient, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (n, k, 3)`` with the gradients by the given corners of the given elements."""
+    n, modes = len(elements), gradient.shape[1]
+    for chunk in nb.prange(CHUNKS):
+        for m in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            for k in range(modes):
+                for i in range(3):
+                    out[m, k, i] = gradient[elements[m], k, 3 * corners[m] + i]
+
+
+@parallel
+def _sum_forces(start, elements, gradient, q, out):  # type: ignore[no-untyped-def]
     """Fill ``out (3 n_nodes,)`` with the sums over the elements at each node of gradients times `q`."""
     n, modes = len(start) - 1, gradient.shape[1]
     for chunk in nb.prange(CHUNKS):
         for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             f0 = f1 = f2 = 0.0
             for m in range(start[a], start[a + 1]):
-                e, at = elements[m], 3 * corners[m]
                 for k in range(modes):
-                    size = q[modes * e + k]
-                    f0 += size * gradient[e, k, at]
-                    f1 += size * gradient[e, k, at + 1]
-                    f2 += size * gradient[e, k, at + 2]
+                    size = q[modes * elements[m] + k]
+                    f0 += size * gradient[m, k, 0]
+                    f1 += size * gradient[m, k, 1]
+                    f2 += size * gradient[m, k, 2]
             out[3 * a], out[3 * a + 1], out[3 * a + 2] = f0, f1, f2
 
 
