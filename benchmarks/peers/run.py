@@ -76,9 +76,12 @@ PEERS = {
     "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=IN_SPACE),
     "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",), cases=(*SIMPLICES, *IN_ROWS)),
     "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
-    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", cases=(*SIMPLICES, *IN_ROWS)),
+    "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", arguments=("P2-P0",)),
+    "ngsolve-q2p0": Peer("NGSolve, Q2–P0", "with_ngsolve.py", "ngsolve", arguments=("Q2-P0",), cases=IN_ROWS),
+    "ngsolve-q2p1": Peer("NGSolve, Q2–P1disc", "with_ngsolve.py", "ngsolve", arguments=("Q2-P1disc",), cases=IN_ROWS),
     "dolfinx-p2p0": Peer("DOLFINx, P2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P0",)),
     "dolfinx-p2p1": Peer("DOLFINx, P2–P1", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("P2-P1",)),
+    "dolfinx-q2p0": Peer("DOLFINx, Q2–P0", "with_dolfinx.py", "dolfinx", ranks=2, arguments=("Q2-P0",), cases=IN_ROWS),
     "dolfinx-q2p1": Peer(
         "DOLFINx, Q2–P1disc",
         "with_dolfinx.py",

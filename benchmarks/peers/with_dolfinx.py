@@ -1,6 +1,6 @@
 """DOLFINx: Newton in one load step, MUMPS in symmetric mode on two MPI ranks.
 
-Its best settings of those tried, with P2–P0, P2–P1, Q2–P1disc or Q2–P1space (third argument). P2–P0 is Turgor's
+Its best settings of those tried, with P2–P0, P2–P1, Q2–P0, Q2–P1disc or Q2–P1space (third argument). P2–P0 is Turgor's
 element, its pressures left in the system, for DOLFINx does not condense them; the Taylor–Hood pair P2–P1 of its demos
 has a quarter of the pressures, but couples them. MUMPS factorises L D Lᵀ (`pc_type cholesky`; LU needs 30 % more
 memory), orders with METIS and analyses the pattern once, on two ranks with one thread each, as both codes are made
@@ -41,7 +41,13 @@ DEGREES = {10: 2, 6: 2, 9: 5, 27: 5}
 """Of the integration rule: four, three, nine and 27 points."""
 
 COMPILED = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
-PRESSURES = {"P2-P0": ("DG", 0), "P2-P1": ("Lagrange", 1), "Q2-P1disc": ("DPC", 1), "Q2-P1space": ("DG", 0)}
+PRESSURES = {
+    "P2-P0": ("DG", 0),
+    "P2-P1": ("Lagrange", 1),
+    "Q2-P0": ("DG", 0),
+    "Q2-P1disc": ("DPC", 1),
+    "Q2-P1space": ("DG", 0),
+}
 """The last two are linear in the coordinates of the reference cell, and in those of space, as in Turgor."""
 
 MUMPS = {

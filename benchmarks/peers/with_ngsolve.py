@@ -1,15 +1,17 @@
 """NGSolve: P2–P0, pressures condensed, Newton in one load step, sparse Cholesky under the task manager.
 
-Its best settings of those tried. The element is Turgor's; static condensation (`condense=True`) removes its pressure
-from the global system, which is positive definite then, so that NGSolve's own parallel Cholesky factorises it; P2–P1
-needs an indefinite solver, and the wheel's only one, UMFPACK, is unsymmetric and serial. NGSolve differentiates the
-compiled potential energy; integration takes the points of Turgor, four a tetrahedron, three a triangle, and `Update`
-keeps the ordering (together 9.0 → 5.7 s of processor time at 5.7 k tetrahedra). Two threads.
+Its best settings of those tried. The elements are Turgor's (in hexahedra and quadrilaterals Q2–P1disc) and, there,
+Q2–P0 (third argument); static condensation (`condense=True`) removes the pressure from the global system, which is
+positive definite then, so that NGSolve's own parallel Cholesky factorises it; P2–P1 needs an indefinite solver, and the
+wheel's only one, UMFPACK, is unsymmetric and serial. NGSolve differentiates the compiled potential energy; integration
+takes the points of Turgor, four a tetrahedron, three a triangle, and `Update` keeps the ordering (together 9.0 → 5.7 s
+of processor time at 5.7 k tetrahedra). Two threads.
 """
 
 from __future__ import annotations
 
 import itertools
+import sys
 
 import netgen.meshing
 import ngsolve as ng
@@ -59,7 +61,8 @@ def solve(case: Case) -> Solved:
         for i, axis in enumerate(axes)
     }
     constant = ng.L2(mesh, order=0)
-    space = ng.VectorH1(mesh, order=2, **held) * (constant ** (1 + case.dimension) if case.is_of_rows else constant)
+    linear = sys.argv[3] == "Q2-P1disc"
+    space = ng.VectorH1(mesh, order=2, **held) * (constant ** (1 + case.dimension) if linear else constant)
     form = potential(case, space)
     solution, given = ng.GridFunction(space), ng.GridFunction(space)
     for name, value in case.held.items():
@@ -73,7 +76,7 @@ def solve(case: Case) -> Solved:
         unknowns=int(np.sum(list(solver.coupling))),
         iterations=solver.newton.iterations,
         factorisations=solver.newton.iterations,
-        settings=f"{'Q2–P1disc' if case.is_of_rows else 'P2–P0'} mixed, condensed; 1 step; sparsecholesky",
+        settings=f"{sys.argv[3].replace('-', '–')} mixed, condensed; 1 step; sparsecholesky",
         version=ng.__version__,
     )
 
@@ -136,8 +139,8 @@ def mesh_of_rows(case: Case) -> ng.Mesh:
 
 
 def pressure(case: Case, p: ng.CoefficientFunction, mesh: ng.Mesh) -> ng.CoefficientFunction:
-    """Return the pressure: in cells that lie in rows one that is linear in the coordinates, as in Turgor."""
-    if not case.is_of_rows:
+    """Return the pressure: constant in a cell, or linear in the coordinates, as in Turgor."""
+    if not p.dims:
         return p
     volumes = ng.Integrate(ng.CF(1), mesh, element_wise=True).NumPy()
     value = p[0]
