@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,12 +34,10 @@ def matrix(request):
     return dense + dense.T + np.diag(rng.uniform(5, 10, 60))
 
 
-WITH_MKL = pytest.mark.skipif(solver_in_use() is not Pardiso, reason="MKL is not installed")
 KINDS = [
     SuperLU,
     pytest.param(Mumps, marks=pytest.mark.skipif(not is_available("mumps"), reason="MUMPS is not installed")),
-    pytest.param(Pardiso, marks=WITH_MKL),
-    pytest.param(partial(Pardiso, alone=True), marks=WITH_MKL, id="Pardiso on one thread"),
+    pytest.param(Pardiso, marks=pytest.mark.skipif(solver_in_use() is not Pardiso, reason="MKL is not installed")),
 ]
 
 
@@ -101,7 +98,7 @@ def test_singular_matrix_is_reported_by_superlu():
         SuperLU(start, column).factorise(values)
 
 
-@WITH_MKL
+@pytest.mark.skipif(solver_in_use() is not Pardiso, reason="only PARDISO tells beforehand")
 def test_memory_is_known_before_it_is_taken_and_a_lack_of_it_said(monkeypatch, caplog):
     def membrane(n: int) -> Pardiso:
         line = sp.diags([2.0, -1.0], [0, 1], (n, n))

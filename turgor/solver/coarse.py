@@ -24,13 +24,6 @@ At 36 000 both cost the same, and the factorisation saves iterations where the f
 """
 
 
-ON_ONE_THREAD = 15_000
-"""Unknowns up to which a factorised coarse level takes one thread.
-
-On two its solution alone is faster, but every cycle would have MKL's threads and those of the kernels take turns.
-"""
-
-
 class CoarseSolver(Protocol):
     """Solves with a symmetric matrix of one pattern, or nearly."""
 
@@ -51,9 +44,7 @@ def make_coarse_solver(row_start: Ints, column: Ints, points: Floats, free: NDAr
     if n > FACTORISED:
         log.warning("the coarse level has %d unknowns; with the package 'pyamg' it need not be factorised", n)
     kind = solver_in_use()
-    if kind is not Pardiso:
-        return kind(row_start, column)
-    return Pardiso(row_start, column, single=True, alone=n <= ON_ONE_THREAD)
+    return Pardiso(row_start, column, single=True) if kind is Pardiso else kind(row_start, column)
 
 
 class SmoothedAggregation:

@@ -10,8 +10,7 @@ import functools
 import os
 import weakref
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -150,17 +149,14 @@ class Pardiso(LinearSolver):
         As for :class:`LinearSolver`.
     single
         Whether factors and solutions are in single precision, in half of the memory.
-    alone
-        Whether all is done on one thread: a small matrix between kernels, whose threads and MKL's hinder each other.
     """
 
     name = "MKL PARDISO"
 
-    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False, alone: bool = False) -> None:
+    def __init__(self, row_start: Ints, column: Ints, *, single: bool = False) -> None:
         library = _mkl()
         assert library is not None
-        self._library = library
-        self._alone = alone
+        self._pardiso = library.pardiso
         self._precision: type[np.floating] = np.float32 if single else np.float64
         self._release: Callable[[], object] = _nothing
         super().__init__(row_start, column)
@@ -195,14 +191,7 @@ class Pardiso(LinearSolver):
             warn_of_memory(self.memory_mb)
             matrix = (_EMPTY, self.row_start, self.column)
             self._release = weakref.finalize(
-                self,
-                _pardiso_call,
-                self._library.pardiso,
-                _RELEASE,
-                self._handle,
-                self._control,
-                matrix,
-                (_EMPTY, _EMPTY),
+                self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
             )
         self._call(_FACTORISE)
 
@@ -231,16 +220,14 @@ class Pardiso(LinearSolver):
     def _call(
         self, phase: int, right: NDArray[np.floating] | None = None, solution: NDArray[np.floating] | None = None
     ) -> None:
-        # Factors that several threads have made one thread cannot solve with: one for all calls, or for none.
-        with _one_thread(self._library) if self._alone else nullcontext():
-            error = _pardiso_call(
-                self._library.pardiso,
-                phase,
-                self._handle,
-                self._control,
-                (self._values, self.row_start, self.column),
-                (_EMPTY if right is None else right, _EMPTY if solution is None else solution),
-            )
+        error = _pardiso_call(
+            self._pardiso,
+            phase,
+            self._handle,
+            self._control,
+            (self._values, self.row_start, self.column),
+            (_EMPTY if right is None else right, _EMPTY if solution is None else solution),
+        )
         if error == -2:
             raise SolverError("not enough memory for the factorisation", advice="A coarser mesh needs less")
         if error == -4:
@@ -250,15 +237,6 @@ class Pardiso(LinearSolver):
 
 
 _EMPTY = np.zeros(1)
-
-
-@contextmanager
-def _one_thread(library: Any) -> Iterator[None]:
-    before = library.MKL_Set_Num_Threads_Local(1)
-    try:
-        yield
-    finally:
-        library.MKL_Set_Num_Threads_Local(before)
 
 
 def _nothing() -> None:
