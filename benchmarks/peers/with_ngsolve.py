@@ -54,6 +54,7 @@ RULES = {
 
 
 def solve(case: Case) -> Solved:
+    element = sys.argv[3]
     mesh = curved_mesh(case)
     axes = "xyz"[: case.dimension]
     held = {
@@ -61,8 +62,8 @@ def solve(case: Case) -> Solved:
         for i, axis in enumerate(axes)
     }
     constant = ng.L2(mesh, order=0)
-    linear = sys.argv[3] == "Q2-P1disc"
-    space = ng.VectorH1(mesh, order=2, **held) * (constant ** (1 + case.dimension) if linear else constant)
+    pressures = constant ** (1 + case.dimension) if element == "Q2-P1disc" else constant
+    space = ng.VectorH1(mesh, order=2, **held) * pressures
     form = potential(case, space)
     solution, given = ng.GridFunction(space), ng.GridFunction(space)
     for name, value in case.held.items():
@@ -76,7 +77,7 @@ def solve(case: Case) -> Solved:
         unknowns=int(np.sum(list(solver.coupling))),
         iterations=solver.newton.iterations,
         factorisations=solver.newton.iterations,
-        settings=f"{sys.argv[3].replace('-', '–')} mixed, condensed; 1 step; sparsecholesky",
+        settings=f"{element.replace('-', '–')} mixed, condensed; 1 step; sparsecholesky",
         version=ng.__version__,
     )
 
