@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -114,3 +117,24 @@ def test_memory_is_known_before_it_is_taken_and_a_lack_of_it_said(monkeypatch, c
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=2**20))
     membrane(200)
     assert "1 MB are free" in caplog.text
+
+
+THREADS = """
+import numpy as np
+from threadpoolctl import threadpool_info
+from turgor.solver.linear import Pardiso
+solver = Pardiso(np.arange(4, dtype=np.int32), np.arange(3, dtype=np.int32))
+solver.factorise(np.ones(3))
+print([pool["threading_layer"] for pool in threadpool_info() if pool["internal_api"] == "mkl"])
+"""
+
+
+@pytest.mark.skipif(solver_in_use() is not Pardiso, reason="MKL is not installed")
+@pytest.mark.parametrize(("chosen", "layer"), [({}, "intel"), ({"MKL_THREADING_LAYER": "SEQUENTIAL"}, "sequential")])
+def test_mkl_has_the_same_threads_whatever_was_loaded_first_unless_the_user_chose_others(chosen, layer):
+    # gmsh brings GNU's OpenMP, which MKL takes if it is left to itself.
+    kept = {name: value for name, value in os.environ.items() if name != "MKL_THREADING_LAYER"}
+    command = [sys.executable, "-c", f"import gmsh\n{THREADS}"]
+    run = subprocess.run(command, env=kept | chosen, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == f"['{layer}']"

@@ -341,14 +341,25 @@ class SuperLU(LinearSolver):
         return None
 
 
+_INTEL_OPENMP = 0
+
+
 @functools.cache
 def _mkl() -> Any | None:
-    """Load MKL's runtime library from its Python package, or return ``None`` where there is none."""
-    # Threads that spin after a factorisation would take the cores from the element kernels.
-    os.environ.setdefault("KMP_BLOCKTIME", "0")
+    """Load MKL's runtime library from its Python package, or return ``None`` where there is none.
+
+    It runs on the threads of Intel's OpenMP, also where those of GNU's are in the process before it (gmsh brings them):
+    these spin for long after a factorisation, on the processors that the element kernels need.
+    """
     library = shared_library("mkl", "libmkl_rt.so", "mkl_rt.")
-    if library is not None:
-        library.pardiso.restype = None
+    if library is None:
+        return None
+    # In ms. Without a spin the threads would have to be woken in each of the short parallel regions of a solution.
+    os.environ.setdefault("KMP_BLOCKTIME", "1")
+    openmp = shared_library("intel-openmp", "libiomp5.so", "libiomp5md.dll")
+    if openmp is not None and "MKL_THREADING_LAYER" not in os.environ:
+        library.MKL_Set_Threading_Layer(_INTEL_OPENMP)
+    library.pardiso.restype = None
     return library
 
 
