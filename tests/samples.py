@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -64,3 +67,11 @@ def check_assembled(system, state, direction, step):
     more, less = (system.forces(shifted(state, direction, h))[0] for h in (step, -step))
     expected = (more - less) / (2.0 * step)
     np.testing.assert_allclose(system.stiffness_times(direction), expected, atol=1e-6 * np.abs(expected).max())
+
+
+def printed(code: str, variable: str, **environment: str) -> str:
+    """What a process of its own prints, an environment variable being as given here or not set at all."""
+    kept = {name: value for name, value in os.environ.items() if name != variable}
+    run = subprocess.run([sys.executable, "-c", code], env=kept | environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()

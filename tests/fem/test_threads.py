@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+from samples import printed
 
 from turgor.common.optional import is_available, shared_library
 
@@ -24,10 +22,7 @@ print(numba.threading_layer())
 
 def layer(**environment: str) -> str:
     """Return the threads that a kernel runs on in a process of its own."""
-    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_THREADING_LAYER"}
-    run = subprocess.run([sys.executable, "-c", LAYER], env=kept | environment, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    return run.stdout.strip()
+    return printed(LAYER, "NUMBA_THREADING_LAYER", **environment)
 
 
 def test_kernels_run_on_tbb_where_it_is_installed() -> None:

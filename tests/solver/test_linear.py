@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import psutil
 import pytest
 import scipy.sparse as sp
-from samples import neo_hookean
+from samples import neo_hookean, printed
 
 from turgor.common.optional import is_available
 from turgor.fem.supports import Prescribed, Sliding
@@ -119,7 +116,9 @@ def test_memory_is_known_before_it_is_taken_and_a_lack_of_it_said(monkeypatch, c
     assert "1 MB are free" in caplog.text
 
 
+# gmsh brings GNU's OpenMP, which MKL takes if it is left to itself.
 THREADS = """
+import gmsh
 import numpy as np
 from threadpoolctl import threadpool_info
 from turgor.solver.linear import Pardiso
@@ -132,9 +131,4 @@ print([pool["threading_layer"] for pool in threadpool_info() if pool["internal_a
 @pytest.mark.skipif(solver_in_use() is not Pardiso, reason="MKL is not installed")
 @pytest.mark.parametrize(("chosen", "layer"), [({}, "intel"), ({"MKL_THREADING_LAYER": "SEQUENTIAL"}, "sequential")])
 def test_mkl_has_the_same_threads_whatever_was_loaded_first_unless_the_user_chose_others(chosen, layer):
-    # gmsh brings GNU's OpenMP, which MKL takes if it is left to itself.
-    kept = {name: value for name, value in os.environ.items() if name != "MKL_THREADING_LAYER"}
-    command = [sys.executable, "-c", f"import gmsh\n{THREADS}"]
-    run = subprocess.run(command, env=kept | chosen, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.strip() == f"['{layer}']"
+    assert printed(THREADS, "MKL_THREADING_LAYER", **chosen) == f"['{layer}']"
