@@ -72,8 +72,8 @@ class Peer:
 
 
 PEERS = {
-    "turgor": Peer("Turgor", "with_turgor.py", arguments=("direct",), cases=tuple(CASES)),
-    "turgor-iterative": Peer("Turgor, iterative", "with_turgor.py", arguments=("iterative",), cases=IN_SPACE),
+    "turgor": Peer("Turgor", "with_turgor.py", arguments=("auto",), cases=tuple(CASES)),
+    "turgor-direct": Peer("Turgor, factorised", "with_turgor.py", arguments=("direct",), cases=IN_SPACE),
     "felupe": Peer("FElupe", "with_felupe.py", "felupe", arguments=("mixed",), cases=(*SIMPLICES, *IN_ROWS)),
     "felupe-p2": Peer("FElupe, P2", "with_felupe.py", "felupe", arguments=("displacement",), cases=("punch",)),
     "ngsolve": Peer("NGSolve", "with_ngsolve.py", "ngsolve", arguments=("P2-P0",)),

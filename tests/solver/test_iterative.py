@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import logging
-
 import numba
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from samples import neo_hookean, random_state
 
-from turgor.common.errors import InputError
 from turgor.common.optional import is_available
 from turgor.fem.loads import Force, Pressure
-from turgor.fem.section import PlaneStrain
-from turgor.fem.supports import Clamped, Prescribed, Sliding
+from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.geometry.tube import CappedTube
 from turgor.mesh.cells import body_cell
 from turgor.mesh.generate import generate
-from turgor.mesh.structured import box, rectangle, shell_octant
-from turgor.solver import choice, coarse, iterative, linear
+from turgor.mesh.structured import box, shell_octant
+from turgor.solver import coarse, iterative
 from turgor.solver.blocks import BlockMatrix
-from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.iterative import AUGMENTATION, Iterative
 from turgor.solver.krylov import gmres, softest
 from turgor.solver.linear import LinearSolver, make_linear_solver
@@ -330,42 +325,6 @@ def test_solutions_are_as_accurate_as_asked_for(accuracy):
     error = np.linalg.norm(solver.solution(system, right, accuracy).u - solution)
     assert not solver._factorised
     assert 0.0 < error < 30.0 * accuracy * np.linalg.norm(solution)
-
-
-def test_the_path_is_chosen_by_size(monkeypatch):
-    system = sphere("tet10")
-    assert isinstance(make_stiffness_solver(system), LinearSolver)
-    assert isinstance(make_stiffness_solver(system, "iterative"), Iterative)
-    monkeypatch.setattr(choice, "ITERATIVE_FROM", system.n_dofs)
-    assert isinstance(make_stiffness_solver(system), Iterative)
-    assert isinstance(make_stiffness_solver(system, "direct"), LinearSolver)
-
-
-def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
-    body = {"body": neo_hookean()}
-    cube = box((1.0, 1.0, 1.0), (1, 1, 1))
-    cases = {
-        "given displacements": System(cube, body, [Clamped("x0"), Prescribed("x1", (0.1, None, None))]),
-        "oblique": System(shell_octant(1.0, 1.5, 1), body, [Sliding("outer"), Clamped("x0")]),
-        "plane models": System(rectangle((1.0, 1.0), (1, 1)), body, [Clamped("x0")], section=PlaneStrain(1.0)),
-    }
-    with caplog.at_level(logging.INFO):
-        for reason, system in cases.items():
-            caplog.clear()
-            assert isinstance(make_stiffness_solver(system, "iterative"), LinearSolver)
-            assert reason in caplog.text
-
-
-def test_it_is_chosen_where_factors_would_not_fit(monkeypatch):
-    system = sphere("tet10", 1)
-    for free_mb, expected in ((1e3, LinearSolver), (0.1, Iterative)):
-        monkeypatch.setattr(linear, "free_memory_mb", lambda free=free_mb: free)
-        assert isinstance(make_stiffness_solver(system), expected)
-
-
-def test_an_unknown_path_is_refused():
-    with pytest.raises(InputError, match="iterative"):
-        make_stiffness_solver(sphere("tet10", 1), "krylov")
 
 
 def test_the_sweeps_do_not_depend_on_the_threads():

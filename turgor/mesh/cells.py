@@ -243,6 +243,13 @@ def is_body_cell(n_nodes: int) -> bool:
     return n_nodes in _BODY
 
 
+def cells_of_corners(cells: Ints) -> tuple[Ints, Ints]:
+    """Return the nodes at the corners of cells, ascending, and the cells of these alone, numbered in that order."""
+    n_corners = body_cell(cells).n_corners
+    corners, number = np.unique(cells[:, :n_corners], return_inverse=True)
+    return corners, number.reshape(-1, n_corners).astype(np.int32)
+
+
 def jacobians(nodes: Floats, cell: Cell, points: Floats | None = None) -> Floats:
     """Return ∂x/∂ξ of cells with `nodes` ``(m, n_nodes, d)``: ``(m, q, d, dimension)``.
 

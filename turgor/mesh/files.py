@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 
 from turgor.common.errors import InputError
-from turgor.mesh.cells import body_cell, face_cell, is_body_cell
+from turgor.mesh.cells import body_cell, cells_of_corners, face_cell, is_body_cell
 from turgor.mesh.elevate import KINDS
 from turgor.mesh.faces import outward_faces
 from turgor.mesh.inp import read_inp
@@ -210,13 +210,13 @@ def _write_vtu(path: Path, points: FloatArray, sets: Sets) -> None:
 
 
 def _write_vtk(path: Path, mesh: Mesh) -> None:
-    corners, cells = np.unique(mesh.cells[:, : mesh.cell.n_corners], return_inverse=True)
+    corners, cells = cells_of_corners(mesh.cells)
     kind = next(name for name, kind in KINDS.items() if kind.cell == mesh.cell_type and kind.linear)
     region = np.empty(mesh.n_cells, dtype=np.int32)
     for number, members in enumerate(mesh.regions.values()):
         region[members] = number
     points = np.pad(mesh.points[corners], ((0, 0), (0, 3 - mesh.dimension)))
-    stored = meshio.Mesh(points, [(kind, cells.reshape(mesh.n_cells, -1))], cell_data={"region": [region]})
+    stored = meshio.Mesh(points, [(kind, cells)], cell_data={"region": [region]})
     meshio.vtk.write(path, stored, fmt_version="4.2", binary=False)
 
 

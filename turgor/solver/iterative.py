@@ -16,7 +16,6 @@ order of μ.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,13 +67,16 @@ class Iterative(StiffnessSolver):
     ----------
     iterations
         Those of each linear problem so far.
+    tangents
+        Number of stiffnesses taken so far.
     """
 
-    name: ClassVar[str] = "GMRES with multigrid"
-    cheap_again: ClassVar[bool] = False
+    name = "GMRES with multigrid"
+    cheap_again = False
 
     def __init__(self, system: System) -> None:
         self.iterations: list[int] = []
+        self.tangents = 0
         self._levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
         fine = self._levels.fine
         self._pressures = Pressures([solid.nodes for solid in system.solids], fine.rank, self._levels.free)
@@ -90,6 +92,7 @@ class Iterative(StiffnessSolver):
     def take_stiffness(self, system: System, state: State) -> None:
         """Set up the mixed problem and its preconditioner."""
         assert system is self._system
+        self.tangents += 1
         self._factorised = False
         self._state = state
         if self._failures >= FAILURES:

@@ -175,6 +175,7 @@ class Pardiso(LinearSolver):
         control[0] = 1  # the entries below, not the defaults
         control[1] = 3  # nested dissection, in parallel
         control[9] = 10  # pivots below 1e-10 of the norm are perturbed
+        control[17] = -1  # the entries of the factors are counted
         control[20] = 1  # Bunch–Kaufman pivots
         control[23] = 1  # in two levels, whose threads hardly wait for each other
         control[27] = self._precision is np.float32  # single precision
@@ -186,14 +187,18 @@ class Pardiso(LinearSolver):
         """Factorise; the first call also orders and analyses the pattern."""
         self._values = np.asarray(values, self._precision)
         if not self._analysed:
-            self._call(_ANALYSE)
-            self._analysed = True
+            self.analyse()
             warn_of_memory(self.memory_mb)
-            matrix = (_EMPTY, self.row_start, self.column)
-            self._release = weakref.finalize(
-                self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
-            )
         self._call(_FACTORISE)
+
+    def analyse(self) -> None:
+        """Order the pattern and find that of the factors."""
+        self._call(_ANALYSE)
+        self._analysed = True
+        matrix = (_EMPTY, self.row_start, self.column)
+        self._release = weakref.finalize(
+            self, _pardiso_call, self._pardiso, _RELEASE, self._handle, self._control, matrix, (_EMPTY, _EMPTY)
+        )
 
     def release_factors(self) -> None:
         """Give back the memory of the factors; the analysis is kept."""
@@ -210,6 +215,11 @@ class Pardiso(LinearSolver):
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues."""
         return int(self._control[22])
+
+    @property
+    def entries(self) -> int:
+        """Number of entries of the factors, known once the pattern is analysed."""
+        return int(self._control[17])
 
     @property
     def memory_mb(self) -> float:

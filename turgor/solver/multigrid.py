@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from turgor.fem.kernels import CHUNKS, jit, parallel
 from turgor.fem.pattern import SparsePattern
-from turgor.mesh.cells import body_cell
+from turgor.mesh.cells import body_cell, cells_of_corners
 from turgor.solver.blocks import BlockMatrix
 from turgor.solver.coarse import make_coarse_solver
 
@@ -99,8 +99,7 @@ def corner_interpolation(cells: Ints) -> tuple[Ints, sp.csr_matrix]:
     The matrix is ``(n_nodes, n_corners)``.
     """
     cell = body_cell(cells)
-    corners, number = np.unique(cells[:, : cell.n_corners], return_inverse=True)
-    number = number.reshape(len(cells), cell.n_corners)
+    corners, number = cells_of_corners(cells)
     n_nodes = int(cells.max()) + 1
     # Cells that share a node agree on it: whichever has it speaks.
     place = np.full(n_nodes, -1)

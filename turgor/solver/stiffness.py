@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,9 +52,9 @@ class StiffnessSolver(ABC):
     ``tells_inertia`` whether the solver can find the signs of the eigenvalues.
     """
 
-    name: ClassVar[str]
-    cheap_again: ClassVar[bool] = True
-    tells_inertia: ClassVar[bool] = True
+    name: str
+    cheap_again: bool = True
+    tells_inertia: bool = True
 
     @abstractmethod
     def take_stiffness(self, system: System, state: State) -> None:
