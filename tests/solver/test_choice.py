@@ -120,8 +120,11 @@ def test_the_choice_is_the_same_every_time(monkeypatch):
     monkeypatch.setattr(choice, "ITERATIVE_FROM", 0)
     monkeypatch.setattr(choice, "affordable_iterations", lambda _: 12.0)
     monkeypatch.setattr(choice, "USUAL", 0.0)
-    ends = [solve_path(tube(3.0), output_fractions(3), options=PathOptions())[-1] for _ in range(2)]
-    np.testing.assert_array_equal(ends[0].state.u, ends[1].state.u)
+    paths = [solve_path(tube(3.0), output_fractions(3), options=PathOptions()) for _ in range(2)]
+    work = [[(end.factorisations, end.iterations) for end in path] for path in paths]
+    assert work[0] == work[1]
+    # Two threads of MKL's need not add in the same order.
+    np.testing.assert_allclose(paths[0][-1].state.u, paths[1][-1].state.u, rtol=0.0, atol=1e-9)
 
 
 def test_what_the_iterative_path_does_not_know_is_factorised_and_said(caplog):
