@@ -13,11 +13,12 @@ from __future__ import annotations
 import argparse
 import json
 import statistics
-import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import Any
+
+from apart import answer
+from iterations import EXAMPLES, actuator
 
 import turgor as tg
 from turgor.solver import path
@@ -26,10 +27,7 @@ from turgor.solver.iterative import Iterative
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.stiffness import StiffnessSolver
 from turgor.solver.worth import affordable_iterations
-from turgor.study.build import system_of
-from turgor.study.materials import build_materials
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
 WAYS = ("direct", "iterative", "auto")
 HEXAHEDRA = ("mesh.cells=hexahedra", "mesh.per_circle=8")
 CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -66,8 +64,7 @@ def worker(number: int, way: str) -> None:
 def walk(name: str, changes: tuple[str, ...], way: str) -> dict[str, Any]:
     """Return what walking an example's loads, with some of its keys changed, cost, and what was counted."""
     case = tg.load_case(EXAMPLES / f"{name}.yaml", changes)
-    materials, _ = build_materials(case.materials)
-    system = system_of(case, tg.mesh_case(case), materials)
+    system = actuator(case)
     made: list[StiffnessSolver] = []
 
     def make(*arguments: Any) -> StiffnessSolver:
@@ -90,13 +87,6 @@ def walk(name: str, changes: tuple[str, ...], way: str) -> dict[str, Any]:
         "name": solver.name,
         "reached": found[-1].fraction,
     }
-
-
-def measured(number: int, way: str) -> dict[str, Any]:
-    """Return what a worker printed."""
-    command = [sys.executable, __file__, "--worker", str(number), way]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
 
 
 def row(number: int, runs: dict[str, list[dict[str, Any]]]) -> str:
@@ -126,7 +116,7 @@ def main() -> None:
         # Way after way, so that a disturbance of the machine meets all alike.
         for _ in range(asked.repeat):
             for way in WAYS:
-                runs[way].append(measured(number, way))
+                runs[way].append(answer(__file__, number, way))
         print(row(number, runs), flush=True)
 
 

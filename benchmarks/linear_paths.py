@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from apart import answer
 
 from turgor.solver import iterative
 from turgor.solver.choice import make_stiffness_solver
@@ -73,10 +73,7 @@ def worker(path: str, ratio: float, augmentation: float, warm_up: Path, mesh: Pa
 
 def measured(path: str, asked: argparse.Namespace, warm_up: Path, mesh: Path) -> dict[str, object]:
     """Return what a worker printed."""
-    command = [sys.executable, __file__, "--worker", path, str(asked.ratio), str(asked.augmentation)]
-    command += [str(warm_up), str(mesh)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
+    return answer(__file__, path, asked.ratio, asked.augmentation, warm_up, mesh)
 
 
 def row(path: str, run: dict[str, object]) -> str:

@@ -11,16 +11,35 @@ import numpy as np
 import pytest
 
 from turgor.fem.frames import block_products
+from turgor.fem.loads import Pressure
 from turgor.fem.pattern import packed_size
 from turgor.fem.state import State
+from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
+from turgor.geometry.tube import CappedTube
 from turgor.materials.models.neo_hookean import NeoHookean
 from turgor.materials.volumetric import Quadratic
+from turgor.mesh.generate import generate
+from turgor.mesh.structured import shell_octant
 
 
 def neo_hookean(mu: float = 0.1, ratio: float = 1e4, density: float | None = None) -> NeoHookean:
     """A neo-Hookean material of shear modulus `mu` (MPa) and bulk modulus `ratio` times that."""
     return NeoHookean(C10=mu / 2, volumetric=Quadratic(ratio * mu), density=density)
+
+
+def sphere(cell_type: str, n: int = 2, ratio: float = 1e3, pressure: float = 0.02) -> System:
+    """An octant of a thick sphere under inner pressure, MPa."""
+    planes = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
+    mesh = shell_octant(1.0, 1.5, n, cell_type)
+    return System(mesh, {"body": neo_hookean(ratio=ratio)}, planes, [Pressure("inner", pressure)])
+
+
+def tube(size: float, ratio: float = 1e3) -> System:
+    """A short capped tube under inner pressure, in tetrahedra of a size in mm."""
+    shape = CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm")
+    loads = [Pressure("cavity", 0.015)]
+    return System(generate(shape, size), {"body": neo_hookean(ratio=ratio)}, [Clamped("mount")], loads)
 
 
 def random_state(system: System, size: float, seed: int = 0, fraction: float = 0.7) -> State:

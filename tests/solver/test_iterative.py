@@ -6,16 +6,14 @@ import numba
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from samples import neo_hookean, random_state
+from samples import neo_hookean, random_state, sphere, tube
 
 from turgor.common.optional import is_available
-from turgor.fem.loads import Force, Pressure
+from turgor.fem.loads import Force
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
-from turgor.geometry.tube import CappedTube
 from turgor.mesh.cells import body_cell
-from turgor.mesh.generate import generate
-from turgor.mesh.structured import box, shell_octant
+from turgor.mesh.structured import box
 from turgor.solver import coarse, iterative
 from turgor.solver.blocks import BlockMatrix
 from turgor.solver.iterative import AUGMENTATION, Iterative
@@ -26,19 +24,6 @@ from turgor.solver.newton import NewtonOptions, find_equilibrium
 from turgor.solver.path import LimitPressureError, PathOptions, solve_path
 
 PLANES = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
-TUBE = CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm")
-
-
-def sphere(cell_type, n=2, ratio=1e3, pressure=0.02):
-    return System(
-        shell_octant(1.0, 1.5, n, cell_type), {"body": neo_hookean(ratio=ratio)}, PLANES, [Pressure("inner", pressure)]
-    )
-
-
-def tube(size, ratio=1e3):
-    return System(
-        generate(TUBE, size), {"body": neo_hookean(ratio=ratio)}, [Clamped("mount")], [Pressure("cavity", 0.015)]
-    )
 
 
 def direct(system):

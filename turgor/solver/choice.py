@@ -108,7 +108,7 @@ class WhileCheaper(StiffnessSolver):
         """Make ready to solve with the stiffness of a state, and decide how."""
         if isinstance(self._solver, Iterative) and self._is_dearer(self._solver):
             log.info("factorising costs less than %.0f iterations for each tangent", self._affordable)
-            self._use(_direct(system))
+            self._use(self._solver.direct())
         self._solver.take_stiffness(system, state)
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:

@@ -149,6 +149,13 @@ class Iterative(StiffnessSolver):
         exact = float(np.vdot(direction, self._forces(direction)))
         return abs(exact - energy) <= ROUNDED * energy
 
+    def direct(self) -> LinearSolver:
+        """Return the direct solver that helps out, as it is: what it has analysed serves on."""
+        if self._direct is None:
+            pattern: SparsePattern = self._system.pattern
+            self._direct = make_linear_solver(pattern.row_start, pattern.column)
+        return self._direct
+
     def _solution(self, system: System, right: Floats, problem: _Problem | None, accuracy: float) -> Solution:
         found = self._found(problem, accuracy)
         if found is None:
@@ -246,14 +253,12 @@ class Iterative(StiffnessSolver):
         return part
 
     def _factors(self) -> LinearSolver:
-        """Return a direct solver with the stiffness factorised."""
-        pattern: SparsePattern = self._system.pattern
-        if self._direct is None:
-            self._direct = make_linear_solver(pattern.row_start, pattern.column)
+        """Return the direct solver with the stiffness factorised."""
+        direct = self.direct()
         if not self._factorised:
-            self._direct.take_stiffness(self._system, self._state)
+            direct.take_stiffness(self._system, self._state)
             self._factorised = True
-        return self._direct
+        return direct
 
 
 @dataclass(frozen=True, eq=False)

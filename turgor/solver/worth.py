@@ -18,18 +18,24 @@ def affordable_iterations(system: System) -> float:
 
     The costs for each unknown, µs, were measured on two threads (benchmarks/linear_choice.py). What one of factorising
     costs goes by the mean length of the factor's columns, or its square. It is about 6.8 times that of the factor of
-    the graph of the corners alone, which is found in a hundredth of a second. An iteration goes by the matrix itself,
-    and so does what goes with more tangents, as factors serve again. The number is infinite where there is no PARDISO:
-    the other solvers take much longer.
+    the graph of the corners alone, which is soon found. An iteration goes by the matrix itself, and so does what goes
+    with more tangents, as factors serve again. The number is infinite where there is no PARDISO: the other solvers
+    take much longer.
     """
     if solver_in_use() is not Pardiso:
         return np.inf
-    solver = Pardiso(*corner_graph(system.mesh.cells))
-    solver.analyse()
-    in_factor, in_matrix = solver.entries / solver.n, len(system.pattern.column) / system.n_dofs
+    in_factor = length_of_columns(*corner_graph(system.mesh.cells))
+    in_matrix = len(system.pattern.column) / system.n_dofs
     factorising = 1.7e-3 * in_factor**2 + 0.018 * in_factor
     more_tangents, iteration = 0.022 * in_matrix, 0.096 + 0.0012 * in_matrix
     return (factorising - more_tangents) / iteration
+
+
+def length_of_columns(row_start: Ints, column: Ints) -> float:
+    """Return how many entries a column has on average in PARDISO's factor of an upper triangle's pattern."""
+    solver = Pardiso(row_start, column)
+    solver.analyse()
+    return solver.entries / solver.n
 
 
 def corner_graph(cells: Ints) -> tuple[Ints, Ints]:
