@@ -151,14 +151,16 @@ _RENAMED = {
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        return importlib.metadata.version("turgor")
+    value = importlib.metadata.version("turgor") if name == "__version__" else _imported(name)
+    globals()[name] = value  # the next access does not come here
+    return value
+
+
+def _imported(name: str) -> Any:
     home = next((module for module, names in _HOMES.items() if name in names), None)
     if home is None:
         raise AttributeError(f"module 'turgor' has no attribute '{name}'")
-    value = getattr(importlib.import_module(home), _RENAMED.get(name, name))
-    globals()[name] = value  # the next access does not come here
-    return value
+    return getattr(importlib.import_module(home), _RENAMED.get(name, name))
 
 
 def __dir__() -> list[str]:
