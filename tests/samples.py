@@ -13,6 +13,8 @@ import pytest
 from turgor.fem.frames import block_products
 from turgor.fem.loads import Pressure
 from turgor.fem.pattern import packed_size
+from turgor.fem.programme import Programme
+from turgor.fem.section import PlaneStrain
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
@@ -20,7 +22,8 @@ from turgor.geometry.tube import CappedTube
 from turgor.materials.models.neo_hookean import NeoHookean
 from turgor.materials.volumetric import Quadratic
 from turgor.mesh.generate import generate
-from turgor.mesh.structured import shell_octant
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.structured import rectangle, shell_octant
 
 
 def neo_hookean(mu: float = 0.1, ratio: float = 1e4, density: float | None = None) -> NeoHookean:
@@ -40,6 +43,28 @@ def tube(size: float, ratio: float = 1e3) -> System:
     shape = CappedTube(inner_radius="6 mm", wall="2 mm", length="30 mm", cap="6 mm")
     loads = [Pressure("cavity", 0.015)]
     return System(generate(shape, size), {"body": neo_hookean(ratio=ratio)}, [Clamped("mount")], loads)
+
+
+def arch(
+    pressure: float,
+    *,
+    rise: float = 1.2,
+    depth: float = 10.0,
+    above: bool = True,
+    programme: Programme | None = None,
+) -> System:
+    """Half of a shallow arch in plane strain, clamped at its end, under pressure (MPa) from above or from below.
+
+    It spans 20 mm, is 0.4 mm thick and stands `depth` mm above the axis up to which the air on its side counts; with
+    the air above it, so many mm below.
+    """
+    mesh = rectangle((10.0, 0.4), (12, 1), "quad9")
+    points = mesh.points.copy()
+    points[:, 1] += (-depth if above else depth) + rise * np.sin(np.pi * points[:, 0] / 20.0)
+    mesh = Mesh(points, mesh.cells, regions=mesh.regions, surfaces=mesh.surfaces)
+    load = Pressure("y1" if above else "y0", pressure, **({} if programme is None else {"programme": programme}))
+    held = [Clamped("x0"), Sliding("x1")]
+    return System(mesh, {"body": neo_hookean(1.0, 1e3)}, held, [load], section=PlaneStrain())
 
 
 def random_state(system: System, size: float, seed: int = 0, fraction: float = 0.7) -> State:

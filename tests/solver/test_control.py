@@ -10,7 +10,7 @@ from turgor.fem.loads import Pressure
 from turgor.fem.supports import Sliding
 from turgor.fem.system import System
 from turgor.mesh.structured import shell_octant
-from turgor.solver.control import AirAmount, ArcLength, FixedConjugate
+from turgor.solver.control import AirAmount, AlongTangent, ArcLength, FixedConjugate
 from turgor.solver.linear import make_linear_solver
 from turgor.solver.newton import NewtonOptions, find_equilibrium
 from turgor.solver.path import solve_path
@@ -34,7 +34,8 @@ def pressure_at(system, state):
 
 
 def test_derivatives_of_the_gaps():
-    controls = [FixedConjugate(0.3), AirAmount(0.2, FULL), ArcLength(0.1, 0.2, 2.0, 3.0, 0.5)]
+    tangent = AlongTangent(0.1, 0.2, 2.0, np.array([0.6, 0.8]), 0.5)
+    controls = [FixedConjugate(0.3), AirAmount(0.2, FULL), ArcLength(0.1, 0.2, 2.0, 0.5), tangent]
     for control in controls:
         _, by_conjugate, by_fraction = control.gap(0.4, 0.7)
         steps = [(control.gap(0.4 + h, 0.7)[0], control.gap(0.4, 0.7 + h)[0]) for h in (1e-6, -1e-6)]
@@ -74,7 +75,7 @@ def test_arc_length_walks_over_the_top(sphere):
     before, here = solve_path(system, [0.9, 1.0])
     fractions = [here.fraction]
     for _ in range(8):
-        control = ArcLength(system.conjugate(here.state), here.fraction, rest, 0.1, 1.0)
+        control = ArcLength(system.conjugate(here.state), here.fraction, 10.0 * rest, 0.1)
         reach = 1.0 / np.hypot(
             (control.conjugate - system.conjugate(before.state)) / rest, (here.fraction - before.fraction) / 0.1
         )

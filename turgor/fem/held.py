@@ -30,8 +30,14 @@ def check_held(
     Raises
     ------
     InputError
-        Naming a motion that nothing stops.
+        Naming a motion that nothing stops; or if nothing can move at all.
     """
+    if constraints.fixed.all():
+        raise InputError(
+            "supports hold every node, and nothing is left to be found",
+            key="supports",
+            expected="supports on a part of the surface, or a finer mesh",
+        )
     count, part = connected_components(_node_graph(mesh), directed=False)
     nodes, directions = _held_directions(mesh, constraints, springs)
     size = float(np.ptp(mesh.points, axis=0).max())

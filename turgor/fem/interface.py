@@ -62,7 +62,7 @@ class Interface:
         stress = np.empty((*stored.shape[:2], 3, 3))
         stress[:, :, ROW, COL] = stored
         stress[:, :, COL, ROW] = stored
-        _, normal = face_frames((self._points + state.u)[self.faces])
+        _, normal = face_frames((self._points + state.u[: len(self._points)])[self.faces])
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         return np.einsum("kqij,kqj->kqi", stress[:, :, :d, :d], normal), normal
 

@@ -6,8 +6,11 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,29 @@ class Programme:
     def _line(self, fraction: float) -> int:
         last = len(self.fractions) - 2
         return int(np.clip(np.searchsorted(self.fractions, fraction, side="right") - 1, 0, last))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadLine:
+    """All loads along a straight line: what a walk whose load fraction is an unknown follows, also beyond a kink.
+
+    Attributes
+    ----------
+    fraction
+        Load fraction of a point of the line.
+    loads
+        The loads there ``(n_loads,)``.
+    growth
+        Their derivatives by the load fraction ``(n_loads,)``.
+    """
+
+    fraction: float
+    loads: Floats
+    growth: Floats
+
+    def at(self, fraction: float) -> Floats:
+        """Return the loads ``(n_loads,)`` at a load fraction."""
+        return np.asarray(self.loads + (fraction - self.fraction) * self.growth)
 
 
 PROPORTIONAL = Programme((0.0, 1.0), (0.0, 1.0))

@@ -24,7 +24,7 @@ from turgor.fem.held import check_held, check_rim
 from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
 from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import BlockLayout, SparsePattern, packed_size
-from turgor.fem.programme import PROPORTIONAL, Programme
+from turgor.fem.programme import PROPORTIONAL, LoadLine, Programme
 from turgor.fem.section import PlaneStress, Section, check_section, in_section
 from turgor.fem.sheet import Sheet
 from turgor.fem.solid import Solid
@@ -150,6 +150,10 @@ class System:
     def growth(self, fraction: float) -> Floats:
         """Return the derivatives of the loads ``(n_loads,)`` by the load fraction."""
         return np.array([full * programme.slope(fraction) for full, programme in self._programmes])
+
+    def line_at(self, fraction: float) -> LoadLine:
+        """Return the straight line that the loads follow at a load fraction, at a kink the later one."""
+        return LoadLine(fraction, self.loads_at(fraction), self.growth(fraction))
 
     @property
     def kinks(self) -> tuple[float, ...]:

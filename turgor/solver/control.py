@@ -93,14 +93,15 @@ class AirAmount:
 class ArcLength:
     """A given distance from a point of the path, in the plane of Q and f (Riks 1979; Crisfield 1981).
 
-    It passes limits of the load and, other than volume control, places where the volume turns back.
+    It passes limits of the load and, other than volume control, places where the volume turns back; not where both turn
+    at once, as they do where another cavity than that of Q has its limit.
 
     Attributes
     ----------
     conjugate, fraction
         The point.
-    conjugate_scale, fraction_scale
-        What counts as one along each axis.
+    conjugate_scale
+        What counts as one along Q.
     length
         The distance.
     weights
@@ -110,20 +111,58 @@ class ArcLength:
     conjugate: float
     fraction: float
     conjugate_scale: float
-    fraction_scale: float
     length: float
     weights: Floats | None = None
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return the squared distance less the squared length."""
         x = (conjugate - self.conjugate) / self.conjugate_scale
-        y = (fraction - self.fraction) / self.fraction_scale
-        return x * x + y * y - self.length**2, 2 * x / self.conjugate_scale, 2 * y / self.fraction_scale
+        y = fraction - self.fraction
+        return x * x + y * y - self.length**2, 2 * x / self.conjugate_scale, 2 * y
 
     def scale(self, conjugate: float) -> float:
         """Return the squared length."""
         del conjugate
         return self.length**2
+
+
+@dataclass(frozen=True, eq=False)
+class AlongTangent:
+    """A given distance from a point of the path along its tangent there, in the plane of Q and f (Riks 1979).
+
+    For the first step: at the point itself the circle of :class:`ArcLength` has no slope.
+
+    Attributes
+    ----------
+    conjugate, fraction
+        The point.
+    conjugate_scale
+        What counts as one along Q.
+    tangent
+        The unit tangent ``(2,)``.
+    length
+        The distance.
+    weights
+        The weights of Q.
+    """
+
+    conjugate: float
+    fraction: float
+    conjugate_scale: float
+    tangent: Floats
+    length: float
+    weights: Floats | None = None
+
+    def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
+        """Return the distance along the tangent less the length."""
+        x = (conjugate - self.conjugate) / self.conjugate_scale
+        a, b = (float(part) for part in self.tangent)
+        return a * x + b * (fraction - self.fraction) - self.length, a / self.conjugate_scale, b
+
+    def scale(self, conjugate: float) -> float:
+        """Return the length."""
+        del conjugate
+        return self.length
 
 
 class Quantity(Protocol):

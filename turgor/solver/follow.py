@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
-from turgor.solver.control import ArcLength, Quantity, Volume
-from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
+from turgor.solver.control import AlongTangent, ArcLength, Control, Quantity, Volume
+from turgor.solver.events import Event
+from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
+from turgor.solver.path import PathOptions
 from turgor.solver.prediction import predicted
 from turgor.solver.stops import stopped
 from turgor.solver.tally import Tally
-from turgor.solver.volume import LimitPoint, VolumeWalk
+from turgor.solver.volume import SHORT_ENOUGH, LimitPoint, VolumeWalk
 
 log = logger("solver")
 
@@ -30,16 +34,14 @@ OnProgress = Callable[[float, int, float], None]
 FIRST_STEP = 0.3
 """First step of a walk from rest, in parts of what the quantity is there."""
 
-ARC_CUTS = 10
-"""How often a step along the arc is halved before the path is given up."""
 
-
+@dense_products_on_one_thread()
 def follow(
     system: System,
     quantity: Quantity,
     targets: Sequence[float],
     *,
-    options: NewtonOptions | None = None,
+    options: PathOptions | None = None,
     start: Equilibrium | None = None,
     on_equilibrium: OnEquilibrium | None = None,
     on_progress: OnProgress | None = None,
@@ -55,9 +57,11 @@ def follow(
     targets
         Values of the quantity, all above or all below that at the start, in order; each is hit exactly.
     options
-        Tolerance and iteration limit of each equilibrium.
+        Tolerance and iteration limit of each equilibrium, and bounds of a step: the largest in parts of the way to the
+        last target, the smallest in parts of the first one.
     start
-        An equilibrium of the same system to go on from; targets that it has reached are skipped.
+        An equilibrium of the same system to go on from; targets that it has reached are skipped, as are those that
+        the weight alone has passed.
     on_equilibrium
         Called with each state as soon as it is reached.
     on_progress
@@ -66,20 +70,24 @@ def follow(
     Returns
     -------
     list of Equilibrium
-        The states at the targets, and the limits of the load between them, located and with their mode.
+        The states at the targets, and between them those of special kind (:class:`turgor.solver.events.Event`): the
+        limits of the load, located, and the first state behind a bifurcation, each with its mode.
 
     Raises
     ------
     InputError
-        If the targets are not in order, or given displacements grow with the load.
+        If the targets are not in order, given displacements grow with the load, or there is friction.
     StoppedShortError
         If the walk ends before the last target; the last equilibrium found has been delivered too.
     """
-    walk = _walk_from(system, quantity, options or NewtonOptions(), start)
+    options = options or PathOptions()
+    walk = _walk_from(system, quantity, options, start)
     begin = walk.measure(walk.here)
-    sign = _direction(begin, targets, start is not None)
+    _check_sag(walk, targets[-1:], start)
+    sign = _direction(begin, targets, start is not None or system.loaded_at_start)
+    walk.longest = options.largest_step * abs(targets[-1] - begin)
     walk.step = walk.first_step = sign * _first_step(begin, targets)
-    post = _Post(walk.here, on_equilibrium)
+    post = _Post(walk, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
     with _telling_why(walk, post):
@@ -96,17 +104,19 @@ def follow(
                 if previous.rising != found.rising:
                     post.send_limit(walk.limit_between(previous, found))
                     walk.stand_at(found, previous)
+                post.send_bifurcation(previous, found)
             post.send_once(walk.here)
     return post.sent
 
 
+@dense_products_on_one_thread()
 def follow_arc(
     system: System,
     volume: Volume,
     target: float,
     length: float,
     *,
-    options: NewtonOptions | None = None,
+    options: PathOptions | None = None,
     start: Equilibrium | None = None,
     on_equilibrium: OnEquilibrium | None = None,
     on_progress: OnProgress | None = None,
@@ -123,27 +133,31 @@ def follow_arc(
         Its value at the end.
     length
         Distance between the states delivered, in the plane of volume and load fraction; along the first the way from
-        rest to the target counts as one.
+        rest to the target counts as one. Steps are shorter where `options` bounds them to less of that way.
 
     Returns
     -------
     list of Equilibrium
-        The states, and the limits of the load between them where the volume grows through them.
+        The states, and between them the limits of the load where the volume grows through them, and the first state
+        behind a bifurcation.
 
     Raises
     ------
     InputError, StoppedShortError
         As for :func:`follow`.
     """
-    options = options or NewtonOptions()
+    options = options or PathOptions()
     walk = _walk_from(system, volume, options, start)
     rest = volume.value(system.conjugate(system.reference_state(), volume.weights), 0.0)
     scale = abs(target - rest)
-    sign = _direction(walk.measure(walk.here), [target], start is not None)
-    post = _Post(walk.here, on_equilibrium)
+    _check_sag(walk, [target], start)
+    sign = _direction(walk.measure(walk.here), [target], start is not None or system.loaded_at_start)
+    post = _Post(walk, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
-    arc = _Arc(walk, sign, scale, length)
+    parts = math.ceil(length / options.largest_step)
+    arc = _Arc(walk, sign, scale, length / parts)
+    taken = 0
     with _telling_why(walk, post):
         while sign * (target - walk.measure(walk.here)) > _rounding(target):
             previous = walk.here
@@ -157,10 +171,16 @@ def follow_arc(
                 on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
             before = walk.before
             walk.stand_at(found, previous, before)
-            if previous.rising != found.rising and arc.is_flat(previous, found):
+            turns = previous.rising != found.rising
+            if turns and arc.is_flat(previous, found):
                 post.send_limit(walk.limit_between(previous, found))
                 walk.stand_at(found, previous)
-            post.send(found)
+            if not turns:
+                post.send_bifurcation(previous, found)
+            taken += 1
+            if taken % parts == 0:
+                post.send_once(walk.here)
+        post.send_once(walk.here)
     return post.sent
 
 
@@ -190,8 +210,8 @@ class _Arc:
 
     def advance(self) -> Equilibrium | None:
         """Return the next state, or ``None`` where even short steps find none."""
-        length = self.length
-        for _ in range(ARC_CUTS):
+        here, length = self.walk.here, self.length
+        while length >= self.walk.smallest_part * self.length:
             try:
                 found = self._at(length)
             except NotConvergedError as error:
@@ -204,26 +224,33 @@ class _Arc:
                 log.info("arc-length step turned back")
                 length *= 0.5
                 continue
+            if length > SHORT_ENOUGH * self.length and self.is_flat(here, found) and self.walk.may_hide_limits(found):
+                log.info("the arc-length step may hide limits")
+                length *= 0.5
+                continue
             self.direction = way / np.linalg.norm(way)
             return found
         return None
 
     def is_flat(self, first: Equilibrium, second: Equilibrium) -> bool:
-        """Whether the path runs along the volume between two states: there the load turns, elsewhere the volume."""
-        assert first.compliance is not None
-        assert second.compliance is not None
-        return abs(first.compliance * second.compliance) > self.scale**2
+        """Whether the volume goes on in its direction between two states: then it is the load that may turn."""
+        way = self._way(second, first)
+        tangents = [np.array([e.compliance / self.scale, 1.0]) for e in (first, second) if e.compliance is not None]
+        (before, _), (after, _) = (tangent * np.sign(tangent @ way) for tangent in tangents)
+        return bool(before * after > 0.0)
 
     def _at(self, length: float) -> Equilibrium:
         walk = self.walk
         here, before = walk.here, walk.before
         guess, aim = here.state, here.fraction + length * float(self.direction[1])
+        place = (walk.measure(here), here.fraction, self.scale)
+        control: Control = AlongTangent(*place, self.direction, length, walk.quantity.weights)
         if before is not None:
             reach = length / float(np.linalg.norm(self._way(here, before)))
             guess, part = predicted(walk.system, (-1.0, 0.0), (before.state, here.state), reach)
             if part > 0.0:
                 aim = here.fraction + part * reach * (here.fraction - before.fraction)
-        control = ArcLength(walk.measure(here), here.fraction, self.scale, 1.0, length, walk.quantity.weights)
+            control = ArcLength(*place, length, walk.quantity.weights)
 
         def find(state: State) -> Equilibrium:
             return find_equilibrium(walk.system, walk.linear, state, aim, walk.options, control=control)
@@ -238,11 +265,12 @@ class _Arc:
 
 
 class _Post:
-    """Hands out equilibria with the work that led to them, and remembers them."""
+    """Hands out equilibria of a walk with the work that led to them, and remembers them."""
 
-    def __init__(self, start: Equilibrium, on_equilibrium: OnEquilibrium | None) -> None:
+    def __init__(self, walk: VolumeWalk, on_equilibrium: OnEquilibrium | None) -> None:
+        self.walk = walk
         self.tally = Tally()
-        self.last = start
+        self.last = walk.here
         self.sent: list[Equilibrium] = []
         self._on_equilibrium = on_equilibrium
 
@@ -263,24 +291,35 @@ class _Post:
         log.info("limit of the load at %.5g", limit.equilibrium.fraction)
         self.send(replace(limit.equilibrium, event=limit.event, mode=limit.mode))
 
+    def send_bifurcation(self, before: Equilibrium, found: Equilibrium) -> None:
+        """Hand out a state where the walk stands if the path has lost its stability on the way to it."""
+        if self.walk.is_stable(found) is not False or self.walk.is_stable(before) is False:
+            return
+        log.warning("bifurcation between %.5g and %.5g of the load", before.fraction, found.fraction)
+        self.send(replace(found, event=Event.BIFURCATION, mode=self.walk.softest_mode(found)))
+        self.last = found
 
-def _walk_from(system: System, quantity: Quantity, options: NewtonOptions, start: Equilibrium | None) -> VolumeWalk:
+
+def _walk_from(system: System, quantity: Quantity, options: PathOptions, start: Equilibrium | None) -> VolumeWalk:
     if system.constraints.moves:
         raise InputError("given displacements cannot grow where the load is what it must be", key="control")
     if system.kinks:
         raise InputError("loads with a programme follow time, not a volume", key="control")
-    linear = make_stiffness_solver(system, options.linear)
+    if system.rubs:
+        raise InputError("friction follows the path of the loads, not a volume", key="control")
+    newton = options.newton
+    linear = make_stiffness_solver(system, newton.linear)
     here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
     try:
         if start is None and system.loaded_at_start:
-            here = kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, options), here.state)
-        return VolumeWalk(system, linear, here, 1.0, options, quantity)
+            here = kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, newton), here.state)
+        return VolumeWalk(system, linear, here, 1.0, newton, quantity, smallest_part=options.smallest_step)
     except NotConvergedError as error:
         raise stopped(system, here, error) from error
 
 
 def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
-    """Return the sign in which the targets lie."""
+    """Return the sign in which the targets lie; going on, some may lie behind."""
     sign = float(np.sign(targets[-1] - begin)) if len(targets) else 0.0
     ahead = [begin, *(t for t in targets if sign * (t - begin) > 0.0)] if going_on else [begin, *targets]
     if sign == 0.0 and going_on:
@@ -288,6 +327,21 @@ def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
     if sign == 0.0 or any(sign * (b - a) <= 0.0 for a, b in itertools.pairwise(ahead)):
         raise InputError("the targets must lead away from the start, in order", key="targets", value=list(targets))
     return sign
+
+
+def _check_sag(walk: VolumeWalk, last: Sequence[float], start: Equilibrium | None) -> None:
+    """Refuse a last target that the weight alone has passed."""
+    if start is not None or not walk.system.loaded_at_start:
+        return
+    begin, rest = walk.measure(walk.here), walk.measure(Equilibrium(walk.system.reference_state(), 0.0, (0.0,), 0, 0))
+    for target in last:
+        if (target - rest) * (target - begin) <= 0.0:
+            raise InputError(
+                "the weight alone takes the cavity beyond the target",
+                key="control.target",
+                value=f"{100.0 * target / rest:.5g} % of that at rest",
+                expected=f"a target beyond {100.0 * begin / rest:.5g} %, or the other way",
+            )
 
 
 def _first_step(begin: float, targets: Sequence[float]) -> float:

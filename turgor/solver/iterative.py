@@ -191,6 +191,8 @@ class Iterative(StiffnessSolver):
         if problem is None:
             return None
         n, x, residual = len(problem.load), problem.start, problem.residual
+        if not np.any(residual):
+            return x[:n], x[n:]
         goal = accuracy * float(np.linalg.norm(residual))
         count = 0
         while True:

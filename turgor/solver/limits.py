@@ -53,7 +53,7 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
         if found.fraction >= goal:
             try:
-                return _at_load(walk, goal, previous, found, tally)
+                return replace(at_load(walk, goal, previous, found, tally), event=Event.POST_SNAP)
             except NotConvergedError as error:
                 ended = f"and the state at the limit's loads was enclosed but not found ({error.reason})"
                 break
@@ -67,11 +67,17 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
     raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, rest, ended))
 
 
-def _at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
-    """Return the equilibrium at a load fraction between two states of the walk, the load given."""
+def at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
+    """Return the equilibrium at a load fraction between two states of a walk, the load given.
+
+    Raises
+    ------
+    NotConvergedError
+        If none is found there.
+    """
 
     def at_goal(state: State) -> Equilibrium:
-        return find_equilibrium(walk.system, walk.linear, state, goal, walk.options)
+        return find_equilibrium(walk.system, walk.linear, state, goal, walk.options, line=walk.line)
 
     for _ in range(REFINEMENTS):
         part = (goal - below.fraction) / (above.fraction - below.fraction)
@@ -84,7 +90,7 @@ def _at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibri
             tally.count(middle)
             below, above = (middle, above) if middle.fraction < goal else (below, middle)
             continue
-        return replace(found, event=Event.POST_SNAP)
+        return found
     raise NotConvergedError(f"no equilibrium after {REFINEMENTS} refinements")
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.programme import LoadLine
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.control import Control
@@ -69,17 +70,6 @@ class Equilibrium:
         """Whether the load grows with the volume along the path here (known under volume control only)."""
         return self.compliance is not None and self.compliance > 0.0
 
-    @property
-    def stable_at_fixed_volume(self) -> bool | None:
-        """Whether Π has a minimum here among states of the same volume; ``None`` if that is not known.
-
-        The bordered matrix has the tangent's negative eigenvalues and one more where the compliance is positive;
-        exactly one belongs to the volume's own multiplier.
-        """
-        if self.negative_pivots is None or self.compliance is None:
-            return None
-        return self.negative_pivots + (self.compliance > 0.0) == 1
-
 
 SMALLEST_DAMPING = 1 / 32
 TRIALS = 5
@@ -118,6 +108,7 @@ def find_equilibrium(
     on_iteration: Callable[[int, float], None] | None = None,
     *,
     control: Control | None = None,
+    line: LoadLine | None = None,
 ) -> Equilibrium:
     """Find the equilibrium at a load fraction, or where a control cuts the path, from a guess.
 
@@ -142,13 +133,16 @@ def find_equilibrium(
     control
         If given, the load fraction is an unknown, and this equation takes its place: a bordered system, one
         factorisation and two right-hand sides an iteration.
+    line
+        The loads as the load fraction changes; left out, those of their programmes at the fraction.
 
     Raises
     ------
     NotConvergedError
         With the residual history and the worst element, if no equilibrium is reached.
     """
-    state = guess.with_loads(system.loads_at(fraction))
+    line = line or system.line_at(fraction)
+    state = guess.with_loads(line.at(fraction))
     pending = system.constraints.imposed(state.u, fraction) - state.u
     moving = bool(np.any(pending))
     progress = Progress(options)
@@ -167,11 +161,11 @@ def find_equilibrium(
         if tangent is not None and not moving and not (reached and tangent.is_sharp(relative)):
             step = tangent.solved_again(state, fraction, relative)
         if reached and step is None:
-            return _accepted(system, linear, state, fraction, control, tangent, progress)
+            return _accepted(system, linear, state, fraction, control, line, tangent, progress)
         if tangent is None or step is None:
             if reason := progress.hopeless:
                 raise failure(reason, system, state, progress.residuals)
-            tangent = Tangent(system, linear, state, fraction, control, progress)
+            tangent = Tangent(system, linear, state, fraction, control, line.growth, progress)
             step = tangent.solved(residual, pending if moving else None)
         state, damping = _advanced(system, state, step, progress.residuals, search=control is None and not moving)
         # What a shortened step left of the given displacements is imposed by the next one.
@@ -180,7 +174,7 @@ def find_equilibrium(
         if damping < 1.0:
             tangent = None
         fraction += damping * step.change
-        state = state.with_loads(system.loads_at(fraction))
+        state = state.with_loads(line.at(fraction))
 
 
 def _relative_gap(control: Control, conjugate: float, fraction: float) -> float:
@@ -273,12 +267,13 @@ def _accepted(
     state: State,
     fraction: float,
     control: Control | None,
+    line: LoadLine,
     tangent: Tangent | None,
     progress: Progress,
 ) -> Equilibrium:
     state = system.consistent(state.u, state.loads, state.penalty, state.grips, state.margin)
     if tangent is None or not tangent.is_near(state):
-        tangent = Tangent(system, linear, state, fraction, control, progress)
+        tangent = Tangent(system, linear, state, fraction, control, line.growth, progress)
     return Equilibrium(
         state,
         fraction,

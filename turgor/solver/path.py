@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError, SolverError
@@ -18,17 +18,19 @@ from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
 from turgor.solver.events import Event
-from turgor.solver.limits import after_snap
+from turgor.solver.limits import after_snap, at_load
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.tangent import factorise_tangent
-from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, softest_mode
+from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, is_monotone, softest_mode
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
 log = logger("solver")
+
+Floats = NDArray[np.float64]
 
 CUT = 0.4
 GROWTH = 1.6
@@ -39,9 +41,13 @@ FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
 
 LARGE_CHANGE = 1.0
-"""Part of the conjugate by which a step may change it without being asked whether it has jumped."""
+STEEPER = 2.0
+"""A step is asked whether it has jumped if it has changed the conjugate by more than this part of it, or so many times
+as fast as the step before (the first step: as what lies ahead of it).
 
-MONOTONE = 3.0
+Where cavities are roomy, a wall that snaps changes the conjugate by little: a shallow arch by a twentieth, 16 times as
+fast as the step before. Before its limit it gives way up to twice as fast from step to step.
+"""
 
 LONGEST_REACH = 2.0
 """Lengths of the last step by which the next one is predicted at most."""
@@ -170,6 +176,7 @@ class _Walk:
         self._tally = Tally()
         self._delivered = start
         self._failures = 0
+        self._tried_from: Equilibrium | None = None
 
     def deliver(self) -> None:
         """Hand out the equilibrium reached, with the work of all steps since the last one; not a second time."""
@@ -190,6 +197,8 @@ class _Walk:
                 aim = target
             found = self._try(aim, target)
             if found is not None:
+                if found.event is None and found.stable is False and self.here.stable is not False:
+                    found = self._bifurcated(found)
                 # A snap leads nowhere that could be gone on with.
                 past = () if found.event is Event.POST_SNAP else (*self.past, self.here)[-2:]
                 self._arrive(found)
@@ -222,11 +231,11 @@ class _Walk:
             return self._failed(size, target, NotConvergedError("the path has a jump"))
         if found.factorisations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
-        return self._bifurcated(found) if found.stable is False and self.here.stable is not False else found
+        return found
 
     def _bifurcated(self, found: Equilibrium) -> Equilibrium:
         """Mark the first state behind a bifurcation: the inertia has changed, and the load has no limit there."""
-        mode = softest_mode(self.system, self.linear, found)
+        mode = softest_mode(self.system, self.linear, found.state, self.system.growth(found.fraction))
         log.warning("bifurcation between %.5g and %.5g of the load", self.here.fraction, found.fraction)
         return replace(found, event=Event.BIFURCATION, mode=mode)
 
@@ -234,37 +243,60 @@ class _Walk:
         """Whether a step may have passed over a limit, to a branch behind it.
 
         The load is a smooth function of its conjugate, also through limits, where nothing else grows with it, such as
-        given displacements, which move the conjugate by themselves. The cubic with the values and slopes
-        (inverse compliances) of both ends rises all the way if the slopes, in parts of the mean one, lie in a circle of
-        radius three (Fritsch and Carlson 1980). It is asked for only where the conjugate has changed much.
+        given displacements, which move the conjugate by themselves. Its slopes are the inverse compliances
+        (:func:`turgor.solver.volume.is_monotone`). They are asked for only where the conjugate has changed much.
         """
         system, linear, here = self.system, self.linear, self.here
         if system.constraints.moves:
             return False
         growth = system.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
-        if abs(after - before) <= LARGE_CHANGE * abs(before):
-            return False
-        at_end = compliance(system, linear, found, growth)
-        factorise_tangent(system, linear, here.state)
-        at_start = compliance(system, linear, here, growth)
-        if min(at_start, at_end) <= 0.0:
-            return False  # nothing gives way to the loads yet, as before a body is touched
         mean = (after - before) / (found.fraction - here.fraction)
-        return math.hypot(mean / at_start, mean / at_end) > MONOTONE
+        if abs(after - before) <= LARGE_CHANGE * abs(before) and not self._is_steep(mean, found, growth):
+            return False
+        at_end = compliance(system, linear, found.state, growth, growth)
+        factorise_tangent(system, linear, here.state)
+        at_start = compliance(system, linear, here.state, growth, growth)
+        if mean == 0.0 or min(at_start, at_end) <= 0.0:
+            return False  # nothing gives way to the loads yet, as before a body is touched
+        return not is_monotone(1.0 / mean, 1.0 / at_start, 1.0 / at_end)
+
+    def _is_steep(self, mean: float, found: Equilibrium, growth: Floats) -> bool:
+        """Whether the conjugate has changed much faster on a step than on the one before, or goes on to behind it.
+
+        Without a step before, a further solution tells; by iteration it is not found. Where surfaces touch the path has
+        corners, which say nothing.
+        """
+        if any(self.system.contact_force(e.state) > 0.0 for e in (self.here, found)):
+            return False
+        if self.past:
+            earlier, here = self.past[-1], self.here
+            change = self.system.conjugate(here.state, growth) - self.system.conjugate(earlier.state, growth)
+            return abs(mean) * (here.fraction - earlier.fraction) > STEEPER * abs(change)
+        if not self.linear.cheap_again:
+            return False
+        return abs(mean) > STEEPER * abs(compliance(self.system, self.linear, found.state, growth, growth))
 
     def _failed(self, size: float, target: float, error: NotConvergedError) -> Equilibrium | None:
-        """Shorten the step; where that has not helped, go on by volume control."""
+        """Shorten the step; where that has not helped, and before the walk ends, go on by volume control."""
         self._failures += 1
         self.step = CUT * size
-        # Volume control follows one potential; friction's changes from state to state.
-        if self._failures == FAILURES and not (self.system.constraints.moves or self.system.rubs):
+        ends = self.step < self.options.smallest_step
+        if (self._failures == FAILURES or ends) and self._has_volume_control:
             found = self._by_volume(target)
             if found is not None:
                 return found
-        if self.step < self.options.smallest_step:
+            self._tried_from = self.here
+        if ends:
             raise error
         return None
+
+    @property
+    def _has_volume_control(self) -> bool:
+        """Whether volume control may find what the load does not, and has not been tried from here."""
+        # It follows one potential; friction's changes from state to state.
+        knows = not (self.system.constraints.moves or self.system.rubs)
+        return knows and self.here is not self._tried_from
 
     def _by_volume(self, target: float) -> Equilibrium | None:
         """Follow the path by volume to the load fraction `target`, or to the limit before it.
@@ -292,15 +324,29 @@ class _Walk:
             if self.on_progress is not None:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
             if previous.rising and not found.rising:
-                return self._passed(walk, walk.limit_between(previous, found), found)
+                limit = walk.limit_between(previous, found)
+                if limit.equilibrium.fraction >= target:
+                    return self._below(walk, target, previous, limit)
+                return self._passed(walk, limit, found)
             if found.fraction >= target:
                 try:
                     return self._attempt(target, found.state)
                 except NotConvergedError:
                     return None
+            if walk.is_stable(found) is False and walk.is_stable(previous) is not False:
+                found = self._bifurcated(found)
             self.past, self.here = (*self.past, previous)[-2:], found
+            if found.event:
+                self.deliver()
             previous = found
         return None
+
+    def _below(self, walk: VolumeWalk, target: float, previous: Equilibrium, limit: LimitPoint) -> Equilibrium | None:
+        """Return the state at the target that a step by volume has passed, together with a limit behind it."""
+        try:
+            return at_load(walk, target, previous, limit.equilibrium, self._tally)
+        except NotConvergedError:
+            return None
 
     def _passed(self, walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> Equilibrium:
         """Deliver a limit; then find the state that the actuator snaps to, or raise."""

@@ -100,10 +100,11 @@ def at_limit(
     facts = load_facts(system, limit.equilibrium)
     worst = int(np.argmax(np.linalg.norm(system.body_part(limit.mode), axis=1)))
     facts["mode_largest_at_mm"] = [round(float(x), 3) for x in system.mesh.points[worst]]
-    # On the way down the pressures have a minimum, and what snaps back shrinks.
-    falls = bool(np.sum(limit.equilibrium.state.loads * system.growth(limit.equilibrium.fraction)) < 0.0)
-    beyond = "shrinks while the pressure rises" if falls else "grows while the pressure falls"
-    advice = "Control by volume follows it further; a thicker wall, a stiffer or a stiffening material raises the limit"
+    beyond = _beyond(system, limit.equilibrium)
+    advice = "a thicker wall, a stiffer or a stiffening material raises the limit"
+    if system.cavities and not system.constraints.moves:
+        advice = f"Control by volume follows it further; {advice}"
+    advice = advice[0].upper() + advice[1:]
     cause = ""
     if (point := worst_point(system, limit.equilibrium)).margin < 0.0:
         _, cause, advice, more = _material(point)
@@ -115,6 +116,18 @@ def at_limit(
         facts=facts | (details or {}),
         limit=limit,
     )
+
+
+def _beyond(system: System, limit: Equilibrium) -> str:
+    """Say how the actuator goes on behind a limit: the conjugate of the load grows further while the load falls."""
+    pressures = [k for k, load in enumerate(system.loads) if isinstance(load, Pressure)]
+    growth = system.growth(limit.fraction)
+    if not np.any(growth[pressures]):
+        return "gives way while the load falls"
+    leading = pressures[int(np.argmax(np.abs(growth[pressures])))]
+    if limit.state.loads[leading] < 0.0:
+        return "shrinks while the suction falls" if growth[leading] < 0.0 else "grows while the suction rises"
+    return "grows while the pressure falls" if growth[leading] > 0.0 else "shrinks while the pressure rises"
 
 
 def load_facts(system: System, here: Equilibrium) -> Facts:

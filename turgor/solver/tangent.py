@@ -136,6 +136,7 @@ class Tangent:
         state: State,
         fraction: float,
         control: Control | None,
+        growth: Floats,
         progress: Progress,
     ) -> None:
         self.system, self.linear = system, linear
@@ -145,7 +146,7 @@ class Tangent:
         self._size, self._uses = 0.0, 0
         self.compliance: float | None = None
         if control is not None:
-            growing = system.free_part(-system.load_direction(state, system.growth(fraction)))
+            growing = system.free_part(-system.load_direction(state, growth))
             self._response = linear.solution(system, growing)
             self._measured = system.load_direction(state, control.weights)
             self.compliance = -float(np.vdot(self._measured, self._response.u))

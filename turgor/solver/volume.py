@@ -6,6 +6,7 @@ pressure passes its maximum. The load fraction is then an unknown.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -39,8 +40,13 @@ NEAREST = 0.01
 
 INVERSE_ITERATIONS = 12
 
+CUT = 0.4
 SMALLEST_PART = 1e-3
-"""A step is not cut below this part of the first one."""
+"""A failed step is cut by this, but not below this part of the first one."""
+
+MONOTONE = 3.0
+SHORT_ENOUGH = 0.05
+"""Part of the first step below which a step is not shortened for what it may hide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +58,7 @@ class LimitPoint:
     equilibrium
         The state.
     maximum
-        Whether the pressure has a maximum there (else a minimum).
+        Whether the load is largest there, as it was growing from rest (else it begins to grow again).
     mode
         The eigenmode that the tangent loses its stiffness in, ``(n_points, 3)``, largest component one.
     """
@@ -82,6 +88,15 @@ class VolumeWalk:
         Tolerance and iteration limit of each equilibrium.
     quantity
         What is prescribed.
+    longest
+        Bound of a step's size.
+    smallest_part
+        Part of the first step below which none is cut.
+
+    Attributes
+    ----------
+    line
+        How the loads follow the load fraction: as at the start, also where the walk passes a kink of theirs.
     """
 
     def __init__(
@@ -92,11 +107,16 @@ class VolumeWalk:
         step: float,
         options: NewtonOptions,
         quantity: Quantity | None = None,
+        *,
+        longest: float = np.inf,
+        smallest_part: float = SMALLEST_PART,
     ) -> None:
         self.system = system
         self.linear = linear
         self.options = options
         self.quantity = quantity or Volume()
+        self.line = system.line_at(start.fraction)
+        self.longest, self.smallest_part = longest, smallest_part
         self.here = start if start.compliance is not None else self.with_compliance(start)
         self.before: Equilibrium | None = None
         self._earlier: Equilibrium | None = None
@@ -110,8 +130,9 @@ class VolumeWalk:
 
     def advance(self, limit: float | None = None) -> Equilibrium | None:
         """Return the next equilibrium, not beyond a value of the quantity; ``None`` where no step finds one."""
-        while abs(self.step) >= SMALLEST_PART * abs(self.first_step):
+        while abs(self.step) >= self.smallest_part * abs(self.first_step):
             now = self.measure(self.here)
+            self.step = math.copysign(min(abs(self.step), self.longest), self.step)
             whole = limit is not None and (limit - now) / self.step < 1.0 + SLACK
             aim = limit if whole and limit is not None else now + self.step
             try:
@@ -119,7 +140,11 @@ class VolumeWalk:
             except NotConvergedError as error:
                 log.info("volume step failed: %s", error.reason)
                 self.failure = error
-                self.step = 0.4 * (aim - now)
+                self.step = CUT * (aim - now)
+                continue
+            if abs(aim - now) > SHORT_ENOUGH * abs(self.first_step) and self.may_hide_limits(found):
+                log.info("the volume step may hide limits")
+                self.step = CUT * (aim - now)
                 continue
             if found.factorisations <= EASY:
                 self.step = max(self.step, 1.4 * (aim - now), key=abs)
@@ -154,7 +179,9 @@ class VolumeWalk:
         control = self.quantity.fixed(value)
 
         def find(state: State) -> Equilibrium:
-            return find_equilibrium(self.system, self.linear, state, fraction, self.options, control=control)
+            return find_equilibrium(
+                self.system, self.linear, state, fraction, self.options, control=control, line=self.line
+            )
 
         return kept_apart(self.system, find, guess)
 
@@ -172,7 +199,7 @@ class VolumeWalk:
         """
         ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
         span = ends[1][0] - ends[0][0]
-        best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1]))[2]
+        best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1] * span))[2]
         third = self._earlier
         nearer = 1.0
         for _ in range(30):
@@ -194,32 +221,84 @@ class VolumeWalk:
             dropped = 0 if slope * s0 > 0 else 1
             third = ends[dropped][2]
             ends[dropped] = (aim, slope, best)
-            if abs(slope) * span <= tolerance * abs(best.fraction):
+            if abs(slope * span) <= tolerance * abs(best.fraction):
                 break
-        return LimitPoint(best, ends[0][1] > 0, softest_mode(self.system, self.linear, best))
+        return LimitPoint(best, ends[0][1] * self._sense > 0.0, self.softest_mode(best))
+
+    def softest_mode(self, equilibrium: Equilibrium) -> Floats:
+        """Return the eigenmode of the tangent's smallest eigenvalue in size, as :func:`softest_mode`."""
+        return softest_mode(self.system, self.linear, equilibrium.state, self.line.growth)
 
     def with_compliance(self, equilibrium: Equilibrium) -> Equilibrium:
-        """Return an equilibrium with its compliance, for which the tangent is factorised once more."""
+        """Return an equilibrium with its compliance and its inertia, for which the tangent is factorised once more."""
         factorise_tangent(self.system, self.linear, equilibrium.state)
-        found = compliance(self.system, self.linear, equilibrium, self.quantity.weights)
-        return replace(equilibrium, compliance=found)
+        state, weights = equilibrium.state, self.quantity.weights
+        found = compliance(self.system, self.linear, state, weights, self.line.growth)
+        return replace(equilibrium, compliance=found, negative_pivots=self.linear.inertia())
+
+    def is_stable(self, equilibrium: Equilibrium) -> bool | None:
+        """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
+        return stable_while_held(self.system, self.quantity, equilibrium)
+
+    @property
+    def _sense(self) -> float:
+        """The sign of the compliance of a stable state."""
+        weights = self.quantity.weights
+        return -1.0 if weights is not None and weights @ self.line.growth < 0.0 else 1.0
+
+    def may_hide_limits(self, found: Equilibrium) -> bool:
+        """Whether the load may have a maximum and a minimum on the way to a state, both hidden."""
+        ends = (self.here, found)
+        slopes = [1.0 / c for c in map(_compliance, ends) if c]
+        if len(slopes) < 2 or slopes[0] * slopes[1] < 0.0:
+            return False
+        change = self.measure(found) - self.measure(self.here)
+        return not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
 
 
-def compliance(system: System, linear: StiffnessSolver, equilibrium: Equilibrium, weights: Floats | None) -> float:
-    """Return dQ/df along the path of equilibria, by the tangent that was factorised last."""
+def is_monotone(mean: float, at_start: float, at_end: float) -> bool:
+    """Whether a smooth function is known to rise (or fall) all the way, from its mean slope and those at both ends.
+
+    The cubic with these values and slopes does if the slopes, in parts of the mean one, lie in a circle of radius three
+    (Fritsch and Carlson 1980); the slopes have one sign.
+    """
+    return mean * at_start > 0.0 and math.hypot(at_start, at_end) <= MONOTONE * abs(mean)
+
+
+def stable_while_held(system: System, quantity: Quantity, equilibrium: Equilibrium) -> bool | None:
+    """Say whether a state is stable while a quantity is held; ``None`` if that is not known.
+
+    Holding it adds κ q qᵀ to the tangent, κ > 0, q the direction of the loads: nothing that a stable state loses by; it
+    takes away a negative eigenvalue where 1 + κ qᵀK⁻¹q < 0. Loads that grow against each other have no such q.
+    """
+    if equilibrium.negative_pivots is None or equilibrium.compliance is None or equilibrium.negative_pivots == 0:
+        return equilibrium.stable
     growth = system.growth(equilibrium.fraction)
-    response = linear.solve(system.free_part(system.load_direction(equilibrium.state, growth)))
-    return float(system.free_part(system.load_direction(equilibrium.state, weights)) @ response)
+    weights = growth if quantity.weights is None else quantity.weights
+    signs = np.unique(np.sign(growth[weights != 0.0] * weights[weights != 0.0]))
+    if len(signs) != 1:
+        return None
+    conjugate = system.conjugate(equilibrium.state, quantity.weights)
+    control = quantity.fixed(quantity.value(conjugate, equilibrium.fraction))
+    _, by_conjugate, by_fraction = control.gap(conjugate, equilibrium.fraction)
+    takes_away = signs[0] * (by_fraction + by_conjugate * equilibrium.compliance) < 0.0
+    return bool(equilibrium.negative_pivots == takes_away)
 
 
-def softest_mode(system: System, linear: StiffnessSolver, equilibrium: Equilibrium) -> Floats:
+def compliance(system: System, linear: StiffnessSolver, state: State, weights: Floats | None, growth: Floats) -> float:
+    """Return dQ/df along the path of equilibria, by the tangent that was factorised last; the loads' `growth` by f."""
+    response = linear.solve(system.free_part(system.load_direction(state, growth)))
+    return float(system.free_part(system.load_direction(state, weights)) @ response)
+
+
+def softest_mode(system: System, linear: StiffnessSolver, state: State, growth: Floats) -> Floats:
     """Return the eigenmode of the tangent's smallest eigenvalue in size, ``(n_points, d)``, largest component one.
 
     By inverse iteration, from the load's direction and a little of everything: at a bifurcation the load has no part
     in the mode.
     """
-    factorise_tangent(system, linear, equilibrium.state)
-    vector = system.free_part(system.load_direction(equilibrium.state, system.growth(equilibrium.fraction)))
+    factorise_tangent(system, linear, state)
+    vector = system.free_part(system.load_direction(state, growth))
     noise = np.random.default_rng(0).standard_normal(len(vector))
     vector = vector + 0.1 * float(np.linalg.norm(vector)) / np.sqrt(len(vector)) * noise
     if not np.any(vector):

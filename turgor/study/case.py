@@ -147,6 +147,8 @@ class Draft(Setup):
             raise invalid("the supports move with the load, which is not given", key="control", expected=BY_LOADS)
         elif self.contact is not None and any(body.move is not None for body in self.contact.bodies):
             raise invalid("a rigid body moves with the load, which is not given", key="control", expected=BY_LOADS)
+        elif self.contact is not None and self.contact.rubs:
+            raise invalid("friction follows the path of the loads, not a volume", key="control", expected=BY_LOADS)
         return self
 
     @model_validator(mode="after")

@@ -139,14 +139,18 @@ class ContactCase(StrictModel):
 
     def _check_barrier(self) -> None:
         """Refuse what the barrier does not know."""
-        rubs = [f"bodies.{k}.friction" for k, body in enumerate(self.bodies) if body.friction]
-        if self.friction > 0.0 or rubs:
-            key = "friction" if self.friction > 0.0 else rubs[0]
-            raise invalid("the barrier knows no friction", key=key, expected="no friction, or method: penalty")
+        if self.rubs:
+            raise invalid("the barrier knows no friction", key=self.rubs, expected="no friction, or method: penalty")
         both = [f"bodies.{k}.move" for k, body in enumerate(self.bodies) if body.move and body.spring]
         if both:
             expected = "move or spring, or method: penalty"
             raise invalid("by the barrier a spring has no far end that moves", key=both[0], expected=expected)
+
+    @property
+    def rubs(self) -> str | None:
+        """The key of a coefficient of friction above zero; ``None`` without any."""
+        given = [f"bodies.{k}.friction" for k, body in enumerate(self.bodies) if body.friction]
+        return "friction" if self.friction > 0.0 else next(iter(given), None)
 
     @property
     def labels(self) -> list[str]:

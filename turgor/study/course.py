@@ -15,6 +15,7 @@ from turgor.solver.control import Air, Quantity, Volume
 from turgor.solver.follow import follow, follow_arc
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions, solve_path
+from turgor.solver.volume import stable_while_held
 from turgor.study.control import AirControl, ArcLengthControl, VolumeControl, volume_of
 
 OnEquilibrium = Callable[[Equilibrium], None]
@@ -92,7 +93,7 @@ class QuantityCourse:
                 self.system,
                 self.quantity,
                 self.targets,
-                options=self.options.newton,
+                options=self.options,
                 start=start,
                 on_equilibrium=on_equilibrium,
                 on_progress=on_progress,
@@ -104,7 +105,7 @@ class QuantityCourse:
             self.quantity,
             self.targets[-1],
             self.length,
-            options=self.options.newton,
+            options=self.options,
             start=start,
             on_equilibrium=on_equilibrium,
             on_progress=on_progress,
@@ -118,14 +119,7 @@ class QuantityCourse:
 
     def stable(self, state: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held."""
-        if state.negative_pivots is None or state.compliance is None:
-            return state.stable
-        # Holding it adds κ q qᵀ to the tangent; that takes away a negative eigenvalue where 1 + κ qᵀK⁻¹q < 0.
-        conjugate = self.system.conjugate(state.state, self.quantity.weights)
-        control = self.quantity.fixed(self._value(state.state, state.fraction))
-        _, by_conjugate, by_fraction = control.gap(conjugate, state.fraction)
-        stiffened = by_fraction + by_conjugate * state.compliance < 0.0
-        return state.negative_pivots - stiffened == 0
+        return stable_while_held(self.system, self.quantity, state)
 
     def _value(self, state: object, fraction: float) -> float:
         return self.quantity.value(self.system.conjugate(state, self.quantity.weights), fraction)  # type: ignore[arg-type]

@@ -96,7 +96,8 @@ class Path:
         Parameters
         ----------
         key
-            A key of the history without its unit: ``"twist"``, ``"tip_displacement_x"``.
+            A key of the history without its unit: ``"twist"``, ``"tip_displacement_x"``. Not a number where a state
+            does not have it, as the gap of surfaces that are out of reach of each other.
 
         Raises
         ------
@@ -104,12 +105,13 @@ class Path:
             If the history has no such key.
         """
         # The longest unit first: "N_mm" ends in "mm" too.
-        units = {name: next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None) for name in self.history[0]}
+        names = dict.fromkeys(name for entry in self.history for name in entry)
+        units = {name: next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None) for name in names}
         columns = {name.removesuffix(f"_{unit}"): name for name, unit in units.items() if unit}
         if key not in columns:
             raise InputError("there is no such series", key="series", value=key, expected=suggestion(key, columns))
         name = columns[key]
-        values = np.array([entry[name] for entry in self.history], dtype=float)
+        values = np.array([entry.get(name, np.nan) for entry in self.history], dtype=float)
         return registry().Quantity(values, _UNITS[units[name] or ""])
 
     @property

@@ -19,9 +19,11 @@ from turgor.common.units import from_internal
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
+from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore
 from turgor.results.summary import Summary, summarise
+from turgor.solver.control import ATMOSPHERE
 from turgor.solver.events import Event, Outcome
 from turgor.solver.newton import Equilibrium
 from turgor.solver.stops import StoppedShortError
@@ -38,6 +40,9 @@ from turgor.study.runlog import RunLog
 from turgor.study.states import Recorder, to_equilibrium
 
 log = logger("study")
+
+PRESSURE = "pressure:"
+"""What the names of pressures begin with (:attr:`turgor.fem.system.System.load_names`)."""
 
 MARK = "store.json"
 """The file that makes a folder a run's folder; see :mod:`turgor.results.store`."""
@@ -113,6 +118,7 @@ class _Running:
     def __init__(self, case: Case, folder: Path, show: Progress, run_log: RunLog) -> None:
         self.case, self.folder, self.show, self.run_log = case, folder, show, run_log
         self.begun = time.perf_counter()
+        self._below_vacuum = False
         self.files = data_names(case)
 
     def run(self, *, continues: bool) -> Run:
@@ -178,20 +184,20 @@ class _Running:
 
     def _walk(self, system: System, course: Course, store: RunStore) -> SolverError | None:
         """Follow the path; return what stopped it short, or ``None`` if it reached the end."""
-        last, known = store.last(), None
-        if last and last.fraction >= 1.0:
-            return None
-        if last and last.solver["event"] in (Event.LIMIT, Event.MINIMUM):
+        last, known = store.last(), list[str]()
+        while last and last.solver["event"] in (Event.LIMIT, Event.MINIMUM):
             # The path cannot be taken up at a limit, where it has no direction: from before, the limit is met again.
-            known, last = last.solver["event"], store.load(last.index - 1) if last.index else None
+            known.insert(0, last.solver["event"])
+            last = store.load(last.index - 1) if last.index else None
+        if last and last.fraction >= 1.0 and not known:
+            return None
         start = to_equilibrium(system, last) if last else None
         self.show.stage("load")
         recorder = Recorder(system, store.n_steps, course)
 
         def keep(equilibrium: Equilibrium) -> None:
-            nonlocal known
-            if known is not None and equilibrium.event == known:
-                known = None  # in the store already
+            if known and equilibrium.event == known[0]:
+                del known[0]  # in the store already
             else:
                 self._keep(recorder, store, equilibrium)
 
@@ -215,7 +221,20 @@ class _Running:
         log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
         if equilibrium.event is not None:
             log.warning("%s at %s", equilibrium.event, text)
+        self._warn_of_vacuum(record)
         self.show.advance(record.fraction, text)
+
+    def _warn_of_vacuum(self, record: StepRecord) -> None:
+        """Say once where a pressure that follows from what is prescribed is less than nothing."""
+        deeper = [name for name, value in record.loads.items() if name.startswith(PRESSURE) and value < -ATMOSPHERE]
+        if deeper and not self._below_vacuum:
+            self._below_vacuum = True
+            text = (
+                f"{_load_text(deeper[0], record.loads[deeper[0]])} at step {record.index} is deeper than a vacuum: "
+                "no cavity of air gets there, and beyond it the states are those of a liquid at best"
+            )
+            log.warning(text)
+            self.show.warn(text)
 
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
@@ -246,11 +265,17 @@ def _reached(history: Sequence[Row]) -> str:
     met = _bifurcation(history)
     if met is None:
         return "the target was reached"
-    place = f"{met['pressure_kPa']:.4g} kPa" if "pressure_kPa" in met else f"{met['fraction']:.4g} of the load"
+    regained = history[-1]["stable"] is not False
+    last = next(row for row in reversed(history) if row["stable"] is False)
+    until = f"up to {_place(last)} the states behind it" if regained else "the states behind it"
     return (
-        f"the target was reached, but at {place} the path bifurcates: the states behind it follow a branch that is "
+        f"the target was reached, but at {_place(met)} the path bifurcates: {until} follow a branch that is "
         "unstable. A small force or flaw along the mode that is stored there shows the branch that is taken"
     )
+
+
+def _place(row: Row) -> str:
+    return f"{row['pressure_kPa']:.4g} kPa" if "pressure_kPa" in row else f"{row['fraction']:.4g} of the load"
 
 
 def _bifurcation(history: Sequence[Row]) -> Row | None:
@@ -258,7 +283,7 @@ def _bifurcation(history: Sequence[Row]) -> Row | None:
 
 
 def _load_text(name: str, value: float) -> str:
-    kind, _, place = name.partition(":")
-    if kind == "pressure":
+    _, _, place = name.partition(":")
+    if name.startswith(PRESSURE):
         return f"{from_internal(value, 'pressure', 'kPa'):.4g} kPa in {place}"
     return f"{name} × {value:.4g}"

@@ -1,0 +1,223 @@
+"""Limits of the load are found whatever the steps, the size of the cavity and the sign of the pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from samples import arch, neo_hookean
+
+from turgor.common.errors import InputError
+from turgor.fem.contact.spec import RigidContact
+from turgor.fem.loads import Force, Gravity, Pressure
+from turgor.fem.programme import Programme
+from turgor.fem.rigid import Plane
+from turgor.fem.section import Axisymmetric, PlaneStrain
+from turgor.fem.supports import Clamped, Sliding
+from turgor.fem.system import System
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.structured import quarter_ring, rectangle, shell_octant
+from turgor.solver.control import Volume
+from turgor.solver.events import Event
+from turgor.solver.follow import follow, follow_arc
+from turgor.solver.newton import Equilibrium
+from turgor.solver.path import LimitPressureError, PathOptions, output_fractions, solve_path
+from turgor.solver.volume import is_monotone, stable_while_held
+
+ONE = np.ones(1)
+LIMIT, MINIMUM = 1.12607e-4, 2.43356e-5
+"""Of the arch that rises by 1.2 mm, MPa."""
+SHALLOW = 4.0738e-5
+"""Limit of the one that rises by 0.75 mm: its snap changes the volume of a cavity 10 mm deep by a twentieth."""
+
+
+def volumes(system: System, change: float, steps: int) -> list[float]:
+    rest = system.conjugate(system.reference_state(), ONE)
+    return [float(v) for v in np.linspace(rest, rest + change, steps + 1)[1:]]
+
+
+def events(found: list[Equilibrium]) -> list[tuple[Event, float]]:
+    return [(e.event, float(e.state.loads[0])) for e in found if e.event]
+
+
+def stop(system: System, steps: int, **options: float) -> LimitPressureError:
+    with pytest.raises(LimitPressureError) as stopped:
+        solve_path(system, output_fractions(steps), options=PathOptions(**options))
+    return stopped.value
+
+
+@pytest.mark.parametrize("steps", [1, 2, 10])
+def test_by_volume_both_limits_are_found_though_one_step_could_span_them(steps):
+    system = arch(1.0)
+    found = follow(system, Volume(ONE), volumes(system, 14.0, steps))
+    (first, top), (second, low) = events(found)
+    assert (first, second) == (Event.LIMIT, Event.MINIMUM)
+    assert (top, low) == (pytest.approx(LIMIT, rel=1e-4), pytest.approx(MINIMUM, rel=1e-4))
+    assert all(stable_while_held(system, Volume(ONE), e) for e in found)
+
+
+@pytest.mark.parametrize("steps", [4, 10])
+@pytest.mark.parametrize("full", [1e-4, 1e-2])
+def test_along_the_arc_both_limits_are_found_whatever_the_units_of_its_axes(full, steps):
+    system = arch(full)
+    found = follow_arc(system, Volume(ONE), volumes(system, 12.5, 1)[-1], 1.0 / steps)
+    (first, top), (second, low) = events(found)
+    assert (first, second) == (Event.LIMIT, Event.MINIMUM)
+    assert (top, low) == (pytest.approx(LIMIT, rel=1e-4), pytest.approx(MINIMUM, rel=1e-4))
+
+
+@pytest.mark.parametrize("full", [2e-4, 1.0])
+def test_the_arc_sets_out_from_any_state_of_the_path(full):
+    target = volumes(arch(full), 12.5, 1)[-1]
+    whole = follow_arc(arch(full), Volume(ONE), target, 0.1)
+    for state in whole[:-1]:
+        if not state.event:
+            # As it is taken up from the disk: without what the walk knew there.
+            start = Equilibrium(state.state, state.fraction, state.residuals, 0, 0)
+            system = arch(full)
+            end = follow_arc(system, Volume(ONE), target, 0.1, start=start)[-1]
+            assert system.conjugate(end.state, ONE) == pytest.approx(target, rel=1e-6)
+            assert end.fraction == pytest.approx(whole[-1].fraction, rel=1e-5)
+
+
+def test_friction_and_a_volume_do_not_go_together():
+    plate = RigidContact(Plane((0.0, 0.0, 1.6), (0.0, 0.0, -1.0)), surface="outer", friction=0.3)
+    held = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
+    loads = [Pressure("inner", 0.01)]
+    system = System(shell_octant(1.0, 1.5, 1), {"body": neo_hookean()}, held, loads, contact=[plate])
+    with pytest.raises(InputError, match="friction"):
+        follow(system, Volume(ONE), [1.5])
+
+
+@pytest.mark.parametrize("full", [1.0, -1.0])
+@pytest.mark.parametrize("steps", [1, 3])
+def test_a_limit_of_suction_is_found_where_it_is_whatever_the_sign_of_the_load(full, steps):
+    system = arch(full, above=False)
+    found = follow(system, Volume(ONE), volumes(system, -7.0, steps))
+    ((event, pressure),) = events(found)
+    assert event == Event.LIMIT
+    assert pressure == pytest.approx(-LIMIT, rel=1e-4)
+    assert [stable_while_held(system, Volume(ONE), e) for e in found] == [True] * len(found)
+
+
+@pytest.mark.parametrize("times", [1.3, 4.0])
+@pytest.mark.parametrize("steps", [1, 3, 10])
+def test_a_snap_that_hardly_changes_the_volume_is_not_jumped_over(times, steps):
+    limit = stop(arch(times * SHALLOW, rise=0.75), steps).limit
+    assert float(limit.equilibrium.state.loads[0]) == pytest.approx(SHALLOW, rel=1e-4)
+
+
+@pytest.mark.parametrize("part", [0.95, 0.999])
+@pytest.mark.parametrize("steps", [1, 3])
+def test_a_load_just_below_the_limit_is_reached(part, steps):
+    end = solve_path(arch(part * SHALLOW, rise=0.75), output_fractions(steps))[-1]
+    assert (end.fraction, end.stable, end.event) == (1.0, True, None)
+    # An inflated sphere, on which the volume's own step passes the load and the limit behind it.
+    ring = quarter_ring(1.0, 1.5, 2)
+    sphere = System(
+        ring, {"body": neo_hookean()}, [Sliding("y0")], [Pressure("inner", part * 0.0493473)], section=Axisymmetric()
+    )
+    end = solve_path(sphere, output_fractions(steps))[-1]
+    assert (end.fraction, end.stable, end.event) == (1.0, True, None)
+
+
+def test_a_limit_is_told_where_the_first_failure_is_the_last():
+    limit = stop(arch(1.3 * LIMIT), 20, smallest_step=0.04).limit
+    assert float(limit.equilibrium.state.loads[0]) == pytest.approx(LIMIT, rel=1e-4)
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_a_limit_of_a_force_is_told_in_words_of_a_force(steps):
+    mesh = rectangle((10.0, 0.4), (12, 1), "quad9")
+    points = mesh.points + np.array([[0.0, 1.0]]) * 1.2 * np.sin(np.pi * mesh.points[:, :1] / 20.0)
+    bent = Mesh(points, mesh.cells, surfaces=mesh.surfaces)
+    held = [Clamped("x0"), Sliding("x1")]
+    system = System(
+        bent, {"body": neo_hookean(1.0, 1e3)}, held, [Force("x1", (0.0, -0.005, 0.0))], section=PlaneStrain()
+    )
+    error = stop(system, steps)
+    assert error.limit.equilibrium.fraction * 0.005 == pytest.approx(3.625e-4, rel=1e-3)
+    assert "gives way while the load falls" in str(error)
+    assert "ontrol by volume" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("pressure", "above", "text"),
+    [(1.3 * LIMIT, True, "grows while the pressure falls"), (-1.3 * LIMIT, False, "shrinks while the suction falls")],
+)
+def test_what_lies_behind_a_limit_is_told_in_its_own_words(pressure, above, text):
+    assert text in str(stop(arch(pressure, above=above), 5))
+
+
+def test_behind_a_limit_the_loads_go_on_along_their_line_over_a_kink():
+    up_and_down = Programme((0.0, 0.5, 1.0), (0.0, 1.0, -1.0))
+    found = solve_path(
+        arch(1.3 * LIMIT, programme=up_and_down), output_fractions(10), options=PathOptions(post_snap=True)
+    )
+    met = events(found)
+    assert [event for event, _ in met] == [Event.LIMIT, Event.POST_SNAP] * 2
+    # On the way down it snaps back from where the pressure is smallest.
+    assert [pressure for _, pressure in met] == pytest.approx([LIMIT, LIMIT, MINIMUM, MINIMUM], rel=1e-4)
+    assert found[-1].fraction == 1.0
+
+
+def test_a_bifurcation_by_volume_is_told():
+    ring = quarter_ring(1.0, 1.5, 2)
+    system = System(
+        ring, {"body": neo_hookean(0.3)}, [Sliding("y0")], [Pressure("inner", 0.01)], section=Axisymmetric()
+    )
+    rest = system.conjugate(system.reference_state(), ONE)
+    found = follow(system, Volume(ONE), volumes(system, -0.6 * rest, 5))
+    held = [stable_while_held(system, Volume(ONE), e) for e in found]
+    assert held[0] is True
+    assert held[-1] is False
+    first = held.index(False)
+    assert [e.event for e in found if e.event] == [Event.BIFURCATION]
+    assert found[first].event == Event.BIFURCATION
+    assert np.abs(found[first].mode).max() == pytest.approx(1.0)
+
+
+def test_what_the_weight_has_passed_already_is_left_out():
+    held = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
+    loads = [Pressure("inner", 0.01), Gravity((0.0, 0.0, 2000.0))]
+    system = System(shell_octant(1.0, 1.5, 1), {"body": neo_hookean(0.01, density=1e-6)}, held, loads)
+    weights = np.array([1.0, 0.0])
+    rest = system.conjugate(system.reference_state(), weights)
+    targets = [rest * part for part in (1.02, 1.1, 1.2)]
+    found = follow(system, Volume(weights), targets)
+    reached = [system.conjugate(e.state, weights) / rest for e in found]
+    assert 1.05 < reached[0] < 1.1, "under its weight alone"
+    assert reached[1:] == pytest.approx([1.1, 1.2], rel=1e-6)
+    with pytest.raises(InputError, match="the weight alone"):
+        follow(system, Volume(weights), targets[:1])
+
+
+@pytest.mark.parametrize("along", ["volume", "arc"])
+def test_steps_are_not_longer_than_is_allowed(along):
+    system = arch(1e-3)
+    target = volumes(system, 4.0, 1)[-1]
+    options = PathOptions(largest_step=0.1)
+    told: list[float] = []
+
+    def count(part: float, iteration: int, residual: float) -> None:
+        told.append(part)
+
+    if along == "volume":
+        follow(system, Volume(ONE), [target], options=options, on_progress=count)
+    else:
+        found = follow_arc(system, Volume(ONE), target, 0.5, options=options, on_progress=count)
+        assert 1 < len(found) < len(told)
+    assert len(told) >= 8
+    assert max(np.diff([0.0, *told])) <= 0.12 + 1e-6
+
+
+def test_a_cubic_is_told_to_rise_only_where_it_does():
+    x = np.linspace(0.0, 1.0, 2001)
+    rng = np.random.default_rng(1)
+    told = 0
+    for _ in range(300):
+        mean, start, end = rng.uniform(-0.5, 4.0, 3)
+        cubic = (start + end - 2 * mean) * x**3 + (3 * mean - 2 * start - end) * x**2 + start * x
+        if min(start, end) > 0.0 and is_monotone(mean, start, end):
+            assert np.diff(cubic).min() > -1e-9
+            told += 1
+    assert told > 50
