@@ -8,7 +8,7 @@ from samples import arch, neo_hookean
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.spec import RigidContact
-from turgor.fem.loads import Force, Gravity, Pressure
+from turgor.fem.loads import Force, Pressure
 from turgor.fem.programme import Programme
 from turgor.fem.rigid import Plane
 from turgor.fem.section import Axisymmetric, PlaneStrain
@@ -174,21 +174,6 @@ def test_a_bifurcation_by_volume_is_told():
     assert [e.event for e in found if e.event] == [Event.BIFURCATION]
     assert found[first].event == Event.BIFURCATION
     assert np.abs(found[first].mode).max() == pytest.approx(1.0)
-
-
-def test_what_the_weight_has_passed_already_is_left_out():
-    held = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
-    loads = [Pressure("inner", 0.01), Gravity((0.0, 0.0, 2000.0))]
-    system = System(shell_octant(1.0, 1.5, 1), {"body": neo_hookean(0.01, density=1e-6)}, held, loads)
-    weights = np.array([1.0, 0.0])
-    rest = system.conjugate(system.reference_state(), weights)
-    targets = [rest * part for part in (1.02, 1.1, 1.2)]
-    found = follow(system, Volume(weights), targets)
-    reached = [system.conjugate(e.state, weights) / rest for e in found]
-    assert 1.05 < reached[0] < 1.1, "under its weight alone"
-    assert reached[1:] == pytest.approx([1.1, 1.2], rel=1e-6)
-    with pytest.raises(InputError, match="the weight alone"):
-        follow(system, Volume(weights), targets[:1])
 
 
 @pytest.mark.parametrize("along", ["volume", "arc"])

@@ -8,12 +8,21 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from samples import neo_hookean
 
 import turgor as tg
 from turgor.fem.cavity import Cavity
+from turgor.fem.loads import Gravity, Pressure
+from turgor.fem.supports import Clamped, Sliding
+from turgor.fem.system import System
+from turgor.mesh.structured import shell_octant
 from turgor.results import plots
 from turgor.results.store import RunStore
+from turgor.solver.newton import Equilibrium
+from turgor.solver.path import PathOptions
 from turgor.study.case import load_case
+from turgor.study.control import VolumeControl
+from turgor.study.course import course_by
 from turgor.study.run import Run, run
 
 FREE = "loads=[{type: pressure, cavity: cavity}]"
@@ -109,6 +118,37 @@ def test_a_programme_goes_up_and_down(small_tube: Path) -> None:
     assert again.duration == 4.0
 
 
+def test_under_weight_the_volumes_lead_away_from_where_it_has_settled():
+    held = [Clamped("z0"), Sliding("x0"), Sliding("y0")]
+    loads = [Pressure("inner", 0.01), Gravity((0.0, 0.0, 2000.0))]
+    system = System(shell_octant(1.0, 1.5, 1), {"body": neo_hookean(0.01, density=1e-6)}, held, loads)
+    weights = np.array([1.0, 0.0])
+    rest = system.conjugate(system.reference_state(), weights)
+    for target, steps in (("120 %", 20), ("100 %", 2)):
+        course = course_by(VolumeControl(type="volume", target=target), system, None, steps, PathOptions())
+        found: list[Equilibrium] = []
+        course.walk(None, found.append, None)
+        assert [course.parameter(e) for e in found] == pytest.approx(np.linspace(0.0, 1.0, steps + 1))
+        assert 1.05 < system.conjugate(found[0].state, weights) / rest < 1.1, "under its weight alone"
+        assert system.conjugate(found[-1].state, weights) / rest == pytest.approx(float(target[:-1]) / 100.0)
+    control = VolumeControl(type="volume", target="120 %")
+    with pytest.raises(tg.InputError, match=r"solver\.outputs"):
+        course_by(control, system, ["102 %", "120 %"], 2, PathOptions())
+
+
+def test_where_a_pressure_falls_below_a_vacuum_the_run_says_so_once(
+    small_tube: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    changes = [FREE, "control={type: volume, target: 60 %}", "materials.body.constants.C10=2 MPa", "solver.steps=3"]
+    done, rows = ran(small_tube, *changes)
+    deeper = column(rows, "pressure_kPa") < -SURROUNDINGS
+    assert deeper.any()
+    told = [record.message for record in caplog.records if "deeper than a vacuum" in record.message]
+    assert len(told) == 1
+    assert f"at step {int(np.argmax(deeper))}" in told[0]
+    assert done.converged
+
+
 @pytest.mark.slow
 def test_a_run_that_stopped_at_a_limit_stops_there_again(small_tube: Path) -> None:
     changes = ["loads.0.value=36 kPa", "solver={outputs: [30 kPa, 36 kPa]}"]
@@ -146,5 +186,17 @@ def test_the_python_story_has_volume_and_programmes_too() -> None:
     played = model.play({"cavity": {"time": ["0 s", "1 s", "2 s"], "pressure": ["0 kPa", "10 kPa", "5 kPa"]}}, steps=4)
     assert played.pressure.magnitude == pytest.approx([5.0, 10.0, 7.5, 5.0])
     assert played.series("time").magnitude == pytest.approx([0.5, 1.0, 1.5, 2.0])
-    with pytest.raises(tg.InputError, match="volume"):
-        model.inflate_to("150")
+    for wrong in ("150", 150):
+        with pytest.raises(tg.InputError, match=r"unit is missing .*volume"):
+            model.inflate_to(wrong)
+    with pytest.raises(tg.InputError, match="no cavity has a programme"):
+        model.play({})
+    with pytest.raises(tg.InputError, match="vacuum"):
+        model.inflate("-500 kPa")
+    with pytest.raises(tg.InputError, match="times the shear modulus"):
+        model.inflate("500 MPa")
+    with pytest.raises(tg.InputError, match="cavity: this is no name"):
+        model.inflate("20 kPa", cavity=["cavity"])
+    pulled = [{"type": "traction", "surface": "tip-face", "value": "3 kPa", "direction": [0, 0, 1]}]
+    with pytest.raises(tg.InputError, match="proportion"):
+        tg.Model(mesh, loads=pulled, body=tg.material("neo-hookean", {"C10": "0.05 MPa"})).inflate_to("150 %")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import errno
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +19,8 @@ import pytest
 import yaml
 
 from turgor.common.errors import InputError
+from turgor.results.archive import save_record
+from turgor.results.files import replacing
 from turgor.results.store import RunStore
 from turgor.study.case import load_case
 from turgor.study.run import Run, run
@@ -265,18 +270,53 @@ def test_who_waits_for_the_compiler_is_told_so(
     assert any("compiled" in text for text in shown.told) is not kept
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs kill")
+def test_who_ends_the_process_is_told_what_is_kept(small_tube: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with begun(small_tube, folder, stderr=subprocess.PIPE) as process:
+        process.send_signal(signal.SIGTERM)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert "interrupted; " in told.decode()
+    assert "--resume" in told.decode()
+
+
+def test_a_full_disk_costs_no_finished_step(small_tube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, *arrays: object) -> None:
+        if path.stem == "0002":
+            with replacing(path):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        save_record(path, *arrays)
+
+    folder = tmp_path / "run"
+    with monkeypatch.context() as disk:
+        disk.setattr("turgor.results.store.save_record", full)
+        with pytest.raises(InputError, match=r"0002.*No space left.*2 finished steps are kept, and --resume"):
+            run(load_case(small_tube), folder)
+    assert RunStore.open(folder).n_steps == 2
+    assert run(load_case(small_tube), folder, resume=True).converged
+
+
+@contextlib.contextmanager
+def begun(case: Path, folder: Path, **streams: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A run in a process of its own that has stored its first step."""
+    command = [sys.executable, "-m", "turgor", "run", str(case), "--out", str(folder)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, env=environment, **(quiet | streams)) as process:
+        deadline = time.monotonic() + 120
+        while not list(folder.glob("steps/*.npz")) and time.monotonic() < deadline:
+            time.sleep(0.005)
+        yield process
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="needs kill -9")
 @pytest.mark.usefixtures("unreported")
 def test_kill_9_loses_no_finished_step(whole: Run, small_tube: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    command = [sys.executable, "-m", "turgor", "run", str(small_tube), "--out", str(folder)]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    deadline = time.monotonic() + 120
-    while not list(folder.glob("steps/*.npz")) and time.monotonic() < deadline:
-        time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
-    process.wait(timeout=30)
+    with begun(small_tube, folder) as process:
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=30)
     kept = RunStore.open(folder).n_steps
     assert 1 <= kept <= 4
     assert run(load_case(small_tube), folder, resume=True).converged

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import signal
 import tempfile
 import traceback
 from collections.abc import Iterator
@@ -21,7 +22,12 @@ _CommandLineError: type[Exception] = typer.BadParameter.__bases__[0]
 
 EXIT_UNEXPECTED = 1
 EXIT_INTERRUPTED = 130
-"""What shells report for a command that Ctrl-C ended (128 + SIGINT)."""
+EXIT_TERMINATED = 143
+"""What shells report for a command that Ctrl-C or `kill` ended (128 + SIGINT, 128 + SIGTERM)."""
+
+
+class Terminated(KeyboardInterrupt):
+    """Somebody, such as a queue of jobs, asks the process to end: as Ctrl-C, with a word and nothing lost."""
 
 
 class Commands(TyperGroup):
@@ -30,18 +36,31 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for."""
         try:
-            return super().invoke(ctx)
+            with _heeding_termination():
+                return super().invoke(ctx)
         except tg.TurgorError as error:
             tell(str(error))
             raise typer.Exit(error.exit_code) from error
         except KeyboardInterrupt as error:
             tell(str(error) or "interrupted")
-            raise typer.Exit(EXIT_INTERRUPTED) from error
+            raise typer.Exit(EXIT_TERMINATED if isinstance(error, Terminated) else EXIT_INTERRUPTED) from error
         except (typer.Exit, typer.Abort, BrokenPipeError, _CommandLineError):
             raise
         except Exception as error:  # the last line of defence: no user ever sees a traceback
             tell(f"unexpected {type(error).__name__}: {_one_line(error)}; please report it with {_keep(error)}")
             raise typer.Exit(EXIT_UNEXPECTED) from error
+
+
+@contextlib.contextmanager
+def _heeding_termination() -> Iterator[None]:
+    def end(number: int, frame: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import math
+import signal
+import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import ModuleType
 from typing import Any
@@ -41,6 +43,7 @@ def session(name: str) -> Iterator[ModuleType]:
         raise InputError("a gmsh session is already open in this process", expected="gmsh.finalize() before meshing")
     # gmsh's own handler of the interrupt signal would take it away from the program that called us.
     gmsh.initialize(readConfigFiles=False, interruptible=False)
+    _take_back_termination()
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("General.NumThreads", 1)
@@ -49,6 +52,13 @@ def session(name: str) -> Iterator[ModuleType]:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def _take_back_termination() -> None:
+    """Give the program that called us its handler of SIGTERM back, which gmsh takes away without asking."""
+    handler = signal.getsignal(signal.SIGTERM)
+    if handler is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, handler)
 
 
 def prism(corners: Sequence[tuple[float, float, float]], extent: tuple[float, float, float]) -> int:

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,28 @@ PARTIAL = ".part"
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; it takes the name `path` once its bytes are on the disk."""
+    """Give a temporary path to write to; it takes the name `path` once its bytes are on the disk.
+
+    Raises
+    ------
+    InputError
+        If the system does not let it be written: no room, no right.
+    """
     partial = path.with_name(path.name + PARTIAL)
-    yield partial
-    with partial.open("rb+") as stream:
-        os.fsync(stream.fileno())
-    partial.replace(path)
-    _sync_folder(path.parent)
+    try:
+        yield partial
+        with partial.open("rb+") as stream:
+            os.fsync(stream.fileno())
+        partial.replace(path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise UnwritableError(f"the file cannot be written ({error.strerror or error})", file=path) from error
+
+
+class UnwritableError(InputError):
+    """The system does not let a file be written: no room, no right."""
 
 
 def write_text(path: Path, text: str) -> None:

@@ -19,9 +19,10 @@ from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import AlongTangent, ArcLength, Control, Quantity, Volume
 from turgor.solver.events import Event
-from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.path import PathOptions
 from turgor.solver.prediction import predicted
+from turgor.solver.stiffness import StiffnessSolver
 from turgor.solver.stops import stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import SHORT_ENOUGH, LimitPoint, VolumeWalk
@@ -55,13 +56,13 @@ def follow(
     quantity
         What is prescribed: :class:`turgor.solver.control.Volume` or :class:`turgor.solver.control.Air`.
     targets
-        Values of the quantity, all above or all below that at the start, in order; each is hit exactly.
+        Values of the quantity, all above or all below that at the start (:func:`settled`), in order; each is hit
+        exactly.
     options
         Tolerance and iteration limit of each equilibrium, and bounds of a step: the largest in parts of the way to the
         last target, the smallest in parts of the first one.
     start
-        An equilibrium of the same system to go on from; targets that it has reached are skipped, as are those that
-        the weight alone has passed.
+        An equilibrium of the same system to go on from; targets that it has reached are skipped.
     on_equilibrium
         Called with each state as soon as it is reached.
     on_progress
@@ -83,8 +84,7 @@ def follow(
     options = options or PathOptions()
     walk = _walk_from(system, quantity, options, start)
     begin = walk.measure(walk.here)
-    _check_sag(walk, targets[-1:], start)
-    sign = _direction(begin, targets, start is not None or system.loaded_at_start)
+    sign = _direction(begin, targets, start is not None)
     walk.longest = options.largest_step * abs(targets[-1] - begin)
     walk.step = walk.first_step = sign * _first_step(begin, targets)
     post = _Post(walk, on_equilibrium)
@@ -150,8 +150,7 @@ def follow_arc(
     walk = _walk_from(system, volume, options, start)
     rest = volume.value(system.conjugate(system.reference_state(), volume.weights), 0.0)
     scale = abs(target - rest)
-    _check_sag(walk, [target], start)
-    sign = _direction(walk.measure(walk.here), [target], start is not None or system.loaded_at_start)
+    sign = _direction(walk.measure(walk.here), [target], start is not None)
     post = _Post(walk, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
@@ -307,15 +306,29 @@ def _walk_from(system: System, quantity: Quantity, options: PathOptions, start: 
         raise InputError("loads with a programme follow time, not a volume", key="control")
     if system.rubs:
         raise InputError("friction follows the path of the loads, not a volume", key="control")
-    newton = options.newton
-    linear = make_stiffness_solver(system, newton.linear)
-    here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
+    linear = make_stiffness_solver(system, options.newton.linear)
+    here = start or settled(system, linear, options.newton)
     try:
-        if start is None and system.loaded_at_start:
-            here = kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, newton), here.state)
-        return VolumeWalk(system, linear, here, 1.0, newton, quantity, smallest_part=options.smallest_step)
+        return VolumeWalk(system, linear, here, 1.0, options.newton, quantity, smallest_part=options.smallest_step)
     except NotConvergedError as error:
-        raise stopped(system, here, error) from error
+        raise stopped(system, here, error, by_load=False) from error
+
+
+def settled(system: System, linear: StiffnessSolver, options: NewtonOptions) -> Equilibrium:
+    """Return where a walk begins: rest, or the equilibrium under what acts from the start.
+
+    Raises
+    ------
+    StoppedShortError
+        If there is none.
+    """
+    rest = Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
+    if not system.loaded_at_start:
+        return rest
+    try:
+        return kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, options), rest.state)
+    except NotConvergedError as error:
+        raise stopped(system, rest, error, by_load=False) from error
 
 
 def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
@@ -327,21 +340,6 @@ def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
     if sign == 0.0 or any(sign * (b - a) <= 0.0 for a, b in itertools.pairwise(ahead)):
         raise InputError("the targets must lead away from the start, in order", key="targets", value=list(targets))
     return sign
-
-
-def _check_sag(walk: VolumeWalk, last: Sequence[float], start: Equilibrium | None) -> None:
-    """Refuse a last target that the weight alone has passed."""
-    if start is not None or not walk.system.loaded_at_start:
-        return
-    begin, rest = walk.measure(walk.here), walk.measure(Equilibrium(walk.system.reference_state(), 0.0, (0.0,), 0, 0))
-    for target in last:
-        if (target - rest) * (target - begin) <= 0.0:
-            raise InputError(
-                "the weight alone takes the cavity beyond the target",
-                key="control.target",
-                value=f"{100.0 * target / rest:.5g} % of that at rest",
-                expected=f"a target beyond {100.0 * begin / rest:.5g} %, or the other way",
-            )
 
 
 def _first_step(begin: float, targets: Sequence[float]) -> float:
@@ -364,5 +362,5 @@ def _telling_why(walk: VolumeWalk, post: _Post) -> Iterator[None]:
     except SolverError as error:
         post.send_once(walk.here)
         if isinstance(error, NotConvergedError):
-            raise stopped(walk.system, walk.here, error) from error
+            raise stopped(walk.system, walk.here, error, by_load=False) from error
         raise

@@ -81,10 +81,13 @@ class Fold:
         return self.stretches[2] / self.stretches[0]
 
 
-def stopped(system: System, here: Equilibrium, error: NotConvergedError) -> StoppedShortError:
-    """Return the error for a path on which nothing was found beyond `here`, with the most likely reason."""
+def stopped(system: System, here: Equilibrium, error: NotConvergedError, *, by_load: bool = True) -> StoppedShortError:
+    """Return the error for a path on which nothing was found beyond `here`, with the most likely reason.
+
+    `by_load` says whether the load was given, so that to prescribe a volume may help.
+    """
     facts = load_facts(system, here)
-    outcome, cause, advice, details = _cause(system, here, error)
+    outcome, cause, advice, details = _cause(system, here, error, by_load=by_load)
     return StoppedShortError(
         f"no equilibrium was found beyond {load_text(facts)} ({error.reason}); {cause}",
         advice=advice,
@@ -182,7 +185,9 @@ def deepest_fold(system: System, here: Equilibrium) -> Fold | None:
     return Fold(place, tuple(round(float(x), 4) for x in stretches[worst]))
 
 
-def _cause(system: System, here: Equilibrium, error: NotConvergedError) -> tuple[Outcome, str, str, Facts]:
+def _cause(
+    system: System, here: Equilibrium, error: NotConvergedError, *, by_load: bool
+) -> tuple[Outcome, str, str, Facts]:
     """Return the class of a failure, the cause in words, what to try, and the facts that speak for it."""
     overlap = error.facts.get("overlap_per_wall")
     if isinstance(overlap, float) and overlap > LARGEST_OVERLAP:
@@ -208,7 +213,9 @@ def _cause(system: System, here: Equilibrium, error: NotConvergedError) -> tuple
         advice = "Try smaller steps (solver.largest_step), or a finer mesh where surfaces meet"
         return Outcome.CONTACT, cause, advice, {"contact_area_mm2": area}
     cause = "the material and the elements are sound there"
-    advice = "Try smaller steps (solver.smallest_step), a finer mesh, or control by volume (control.type: volume)"
+    advice = "Try smaller steps (solver.largest_step, solver.smallest_step) or a finer mesh"
+    if by_load and system.cavities and not (system.constraints.moves or system.rubs):
+        advice += ", or control by volume (control.type: volume)"
     return Outcome.UNEXPLAINED, cause, advice, {"smallest_drucker_margin": worst.margin, "smallest_det_F": smallest}
 
 

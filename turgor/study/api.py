@@ -18,8 +18,8 @@ from turgor.results.measures import Choice, available, check
 from turgor.results.stored import Body
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions
-from turgor.study.boundary import UNKNOWN, PressureCase
-from turgor.study.build import every_region
+from turgor.study.boundary import UNKNOWN, GravityCase, PressureCase
+from turgor.study.build import check_pressures, every_region
 from turgor.study.control import VolumeControl, volume_text
 from turgor.study.course import LoadCourse, QuantityCourse, course_by
 from turgor.study.path import Path
@@ -126,9 +126,10 @@ class Model:
         """
         _check_steps(steps)
         value = to_internal(pressure, "pressure", key="pressure")
-        cavities = [cavity] if cavity else _cavities(self.mesh)
-        system = self._system([Pressure(name, value) for name in cavities])
-        how = replace(options or PathOptions(), post_snap=post_snap)
+        self._check_pressures([value], "pressure")
+        system = self._system([Pressure(name, value) for name in _cavities(self.mesh, cavity)])
+        how = options or PathOptions()
+        how = replace(how, post_snap=post_snap or how.post_snap)
         return self._walked(LoadCourse(system, output_fractions(steps), how), on_step)
 
     def inflate_to(
@@ -159,8 +160,10 @@ class Model:
             As :meth:`inflate` does.
         """
         _check_steps(steps)
-        cavities = [cavity] if cavity else _cavities(self.mesh)
-        system = self._system([Pressure(name, UNKNOWN) for name in cavities])
+        if any(not isinstance(load, GravityCase) for load in self.setup.loads):
+            problem = "the loads would grow in no known proportion to the pressure"
+            raise InputError(problem, key="loads", expected="weight alone, or a case with control and both values")
+        system = self._system([Pressure(name, UNKNOWN) for name in _cavities(self.mesh, cavity)])
         control = VolumeControl(type="volume", target=volume_text(volume))
         return self._walked(course_by(control, system, None, steps, options or PathOptions()), on_step)
 
@@ -189,12 +192,20 @@ class Model:
             As :meth:`inflate` does.
         """
         _check_steps(steps)
+        if not programmes:
+            raise InputError("no cavity has a programme", key="programmes", expected="cavity → times and pressures")
         loads = [{"type": "pressure", "cavity": name, "programme": dict(table)} for name, table in programmes.items()]
         setup = Setup.read(supports=_default_supports(self.mesh), loads=loads)
         duration = setup.duration
+        for load in setup.loads:
+            if isinstance(load, PressureCase):
+                self._check_pressures(load.pressures, f"programmes.{load.cavity}")
         pressures = [load.build(duration) for load in setup.loads if isinstance(load, PressureCase)]
         course = LoadCourse(self._system(pressures), output_fractions(steps), options or PathOptions(), duration)
         return self._walked(course, on_step)
+
+    def _check_pressures(self, pressures: Sequence[float], key: str) -> None:
+        check_pressures(pressures, max(material.shear_modulus for material in self.materials.values()), key)
 
     def _system(self, pressures: Sequence[Pressure]) -> System:
         return self.setup.system(self.mesh, self.materials, pressures, self.body.mechanics)
@@ -233,8 +244,13 @@ def _default_supports(mesh: Mesh) -> list[dict[str, str]]:
     return [{"type": "clamped", "surface": "mount"}, *sliding]
 
 
-def _cavities(mesh: Mesh) -> list[str]:
+def _cavities(mesh: Mesh, chosen: str | None) -> list[str]:
     names = cavities_of(mesh)
+    if chosen is not None:
+        if not isinstance(chosen, str):
+            expected = f"one of {', '.join(names)}, or none for all"
+            raise InputError("this is no name", key="cavity", value=chosen, expected=expected)
+        return [chosen]
     if not names:
         raise InputError("the mesh has no cavity to inflate", key="cavity", expected="a surface called 'cavity'")
     return names

@@ -66,22 +66,39 @@ def check_sizes(case: Case, materials: Mapping[str, Hyperelastic]) -> None:
     for number, load in enumerate(case.loads):
         programmed = isinstance(load, PressureCase) and load.programme is not None
         key = f"loads.{number}.{'programme' if programmed else 'value'}"
-        if isinstance(load, PressureCase) and min(load.pressures, default=0.0) < -ATMOSPHERE:
-            raise InputError(
-                "a vacuum cannot be deeper than the pressure of the atmosphere",
-                key=key,
-                value=to_text(min(load.pressures), "pressure"),
-                expected=f"at least {-ATMOSPHERE} MPa",
-            )
-        largest = load.full if isinstance(load, PressureCase) else load.value if isinstance(load, TractionCase) else 0.0
-        if abs(largest) > MOST_PRESSURE_PER_MODULUS * stiffest:
-            raise InputError(
-                f"this is {abs(largest) / stiffest:.3g} times the shear modulus of the stiffest material "
-                f"({stiffest:.3g} MPa), and no actuator of it can hold that",
-                key=key,
-                value=to_text(largest, "pressure"),
-                expected=f"at most {MOST_PRESSURE_PER_MODULUS:g} times the modulus; check both units",
-            )
+        if isinstance(load, PressureCase):
+            check_pressures(load.pressures, stiffest, key)
+        elif isinstance(load, TractionCase):
+            _check_size(load.value, stiffest, key)
+
+
+def check_pressures(pressures: Collection[float], stiffest: float, key: str) -> None:
+    """Refuse pressures in MPa that no cavity can have; `stiffest` is the shear modulus of the stiffest material, MPa.
+
+    Raises
+    ------
+    InputError
+        Naming the key and the pressure.
+    """
+    if min(pressures, default=0.0) < -ATMOSPHERE:
+        raise InputError(
+            "a vacuum cannot be deeper than the pressure of the atmosphere",
+            key=key,
+            value=to_text(min(pressures), "pressure"),
+            expected=f"at least {-ATMOSPHERE} MPa",
+        )
+    _check_size(max(pressures, key=abs, default=0.0), stiffest, key)
+
+
+def _check_size(value: float, stiffest: float, key: str) -> None:
+    if abs(value) > MOST_PRESSURE_PER_MODULUS * stiffest:
+        raise InputError(
+            f"this is {abs(value) / stiffest:.3g} times the shear modulus of the stiffest material "
+            f"({stiffest:.3g} MPa), and no actuator of it can hold that",
+            key=key,
+            value=to_text(value, "pressure"),
+            expected=f"at most {MOST_PRESSURE_PER_MODULUS:g} times the modulus; check both units",
+        )
 
 
 def doubts(case: Case, materials: Mapping[str, Hyperelastic]) -> list[str]:

@@ -28,7 +28,7 @@ from turgor.geometry.space import Space
 from turgor.solver.choice import LinearPath
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
-from turgor.study.boundary import DisplacementCase, Load, PressureCase, Support
+from turgor.study.boundary import DisplacementCase, GravityCase, Load, PressureCase, Support
 from turgor.study.control import ArcLengthControl, ControlCase, PressureControl
 from turgor.study.course import Course, LoadCourse, course_by
 from turgor.study.geometry import Geometry
@@ -36,7 +36,7 @@ from turgor.study.materials import FittedMaterial, MaterialChoice
 from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
-from turgor.study.validation import StrictModel, collected, explain, invalid
+from turgor.study.validation import StrictModel, explain, invalid
 
 
 class MeshCase(StrictModel):
@@ -165,8 +165,16 @@ class Draft(Setup):
             raise invalid("a programme follows time, not a volume", key=f"{key}.programme", expected=BY_LOADS)
         if load.programme is None and not given and (by_load or isinstance(self.control, ArcLengthControl)):
             raise invalid("no pressure is given", key=key, expected="value, or programme with times and pressures")
+        if not by_load and not given and self._grows_beside(load):
+            problem = "no pressure is given, and other loads grow in proportion to it"
+            raise invalid(problem, key=key, expected="value: the pressure that belongs to theirs")
         if given and load.value == 0.0 and not by_load:
             raise invalid("the pressure cannot be zero where it is what it must be", key=f"{key}.value")
+
+    def _grows_beside(self, load: PressureCase) -> bool:
+        """Whether another load grows whose size is given: weight does not, and pressures may all be left open."""
+        others = (other for other in self.loads if other is not load and not isinstance(other, GravityCase))
+        return any(not isinstance(other, PressureCase) or other.value is not None for other in others)
 
     @property
     def pressures(self) -> tuple[PressureCase, ...]:
@@ -190,14 +198,21 @@ class Draft(Setup):
             expected = "pressures in order from 0 to the load's, the last equal to it"
         if target == 0.0:
             raise invalid("the outputs are pressures, and no load is one", key=key, expected="solver.steps instead")
-        with collected():
-            values = [to_internal(text, what) for text in self.solver.outputs]
+        values = [_output(text, what, f"{key}.{number}") for number, text in enumerate(self.solver.outputs)]
         fractions = tuple(value / target for value in values)
         ascending = all(low < high for low, high in zip((0.0, *fractions), fractions, strict=False))
         if not ascending or fractions[-1] != 1.0:
             end = "the load's" if what == "pressure" else "the end of the programmes"
             raise invalid(f"these {what}s do not lead from 0 to {end}", key=key, expected=expected)
         return fractions
+
+
+def _output(text: str, what: str, key: str) -> float:
+    try:
+        return to_internal(text, what)
+    except InputError as error:
+        failure = invalid(error.problem, key=key, value=text, expected=f"a {what} with its unit")
+    raise failure
 
 
 class Case(Draft):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import BeforeValidator, Field
 
 from turgor.common.errors import InputError
 from turgor.common.units import PositivePressure, to_internal
@@ -13,6 +13,9 @@ from turgor.solver.control import ATMOSPHERE
 from turgor.study.validation import StrictModel, invalid
 
 _PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
+
+
+A_VOLUME = "a volume with its unit, such as '5 ml', or per cent of that at rest, such as '250 %'"
 
 
 def volume_of(text: str, rest: float, key: str) -> float:
@@ -23,14 +26,15 @@ def volume_of(text: str, rest: float, key: str) -> float:
     InputError
         If it is neither, or not positive.
     """
+    if not isinstance(text, str):
+        raise InputError("a unit is missing", key=key, value=text, expected=A_VOLUME)
     share = _PERCENT.fullmatch(text)
     try:
         value = rest * float(share[1]) / 100.0 if share else to_internal(text, "volume", key=key)
     except InputError as error:
-        expected = "a volume with its unit, such as '5 ml', or per cent of that at rest, such as '250 %'"
-        raise InputError(error.problem, key=key, value=text, expected=expected) from None
+        raise InputError(error.problem, key=key, value=text, expected=A_VOLUME) from None
     if not value > 0.0:
-        raise InputError("the volume must be greater than 0", key=key, value=text)
+        raise InputError("the volume must be greater than 0", key=key, value=text, expected=A_VOLUME)
     return value
 
 
@@ -42,13 +46,13 @@ def volume_text(text: str) -> str:
 
 def _readable(text: str) -> str:
     try:
-        volume_of(text, 1.0, "")
+        return volume_text(text)
     except InputError as error:
-        raise invalid(error.problem, value=text, expected=error.expected) from None
-    return text
+        failure = invalid(error.problem, value=text, expected=error.expected)
+    raise failure
 
 
-VolumeText = Annotated[str, AfterValidator(_readable)]
+VolumeText = Annotated[str, BeforeValidator(_readable)]
 
 
 class PressureControl(StrictModel):

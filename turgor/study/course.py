@@ -11,8 +11,9 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.fem.loads import Pressure
 from turgor.fem.system import System
+from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Air, Quantity, Volume
-from turgor.solver.follow import follow, follow_arc
+from turgor.solver.follow import follow, follow_arc, settled
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions, solve_path
 from turgor.solver.volume import stable_while_held
@@ -77,10 +78,14 @@ class LoadCourse:
 
 @dataclass(frozen=True, eq=False)
 class QuantityCourse:
-    """Given values of a volume or an amount of air; with a `length`, followed by the length of the path instead."""
+    """Given values of a volume or an amount of air; with a `length`, followed by the length of the path instead.
+
+    `begin` is the value where nothing grows yet: at rest, or under the weight.
+    """
 
     system: System
     quantity: Quantity
+    begin: float
     targets: Sequence[float]
     options: PathOptions
     length: float | None = None
@@ -112,17 +117,14 @@ class QuantityCourse:
         )
 
     def parameter(self, state: Equilibrium) -> float:
-        """Return the part of the way from rest to the target, by the quantity."""
-        rest = self._value(self.system.reference_state(), 0.0)
-        part = (self._value(state.state, state.fraction) - rest) / (self.targets[-1] - rest)
-        return 1.0 if abs(part - 1.0) < SAME else part
+        """Return the part of the way from the beginning to the target, by the quantity."""
+        conjugate = self.system.conjugate(state.state, self.quantity.weights)
+        part = (self.quantity.value(conjugate, state.fraction) - self.begin) / (self.targets[-1] - self.begin)
+        return next((end for end in (0.0, 1.0) if abs(part - end) < SAME), part)
 
     def stable(self, state: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held."""
         return stable_while_held(self.system, self.quantity, state)
-
-    def _value(self, state: object, fraction: float) -> float:
-        return self.quantity.value(self.system.conjugate(state, self.quantity.weights), fraction)  # type: ignore[arg-type]
 
 
 def course_by(
@@ -138,6 +140,8 @@ def course_by(
     ------
     InputError
         If the control does not fit the system or the outputs do not lead to its target.
+    StoppedShortError
+        If there is no equilibrium under the weight alone.
     """
     channels = _channels(system, control.cavity)
     weights = np.zeros(len(system.loads))
@@ -155,25 +159,36 @@ def course_by(
         full = float(system.growth(0.0)[channels[0]])
         quantity, scale = Air(full, control.surroundings, full * weights), control.surroundings
     target = volume_of(control.target, rest, "control.target")
-    if abs(target - rest) < SAME * rest:
-        raise InputError("the target is what there is at rest", key="control.target", value=control.target)
+    begin = _begin(system, quantity, options) / scale
+    if abs(target - begin) < SAME * rest:
+        where = "under the weight alone" if system.loaded_at_start else "at rest"
+        raise InputError(f"the target is what there is {where}", key="control.target", value=control.target)
     if outputs is None:
-        volumes = [float(v) for v in rest + (target - rest) * np.array(output_fractions(steps))]
+        volumes = [float(v) for v in begin + (target - begin) * np.array(output_fractions(steps))]
     else:
-        volumes = _volumes(outputs, rest, target)
+        volumes = _volumes(outputs, rest, begin, target)
     length = 1.0 / steps if isinstance(control, ArcLengthControl) else None
-    return QuantityCourse(system, quantity, [scale * volume for volume in volumes], options, length)
+    return QuantityCourse(system, quantity, scale * begin, [scale * volume for volume in volumes], options, length)
 
 
-def _volumes(outputs: Sequence[str], rest: float, target: float) -> list[float]:
+def _begin(system: System, quantity: Quantity, options: PathOptions) -> float:
+    """Return the value of a quantity before the loads grow."""
+    newton = options.newton
+    state = system.reference_state()
+    if system.loaded_at_start:
+        state = settled(system, make_stiffness_solver(system, newton.linear), newton).state
+    return quantity.value(system.conjugate(state, quantity.weights), 0.0)
+
+
+def _volumes(outputs: Sequence[str], rest: float, begin: float, target: float) -> list[float]:
     volumes = [volume_of(text, rest, f"solver.outputs.{number}") for number, text in enumerate(outputs)]
-    sign = np.sign(target - rest)
-    if np.any(sign * np.diff([rest, *volumes]) <= 0.0) or abs(volumes[-1] - target) > SAME * target:
+    sign = np.sign(target - begin)
+    if np.any(sign * np.diff([begin, *volumes]) <= 0.0) or abs(volumes[-1] - target) > SAME * target:
         raise InputError(
             "these volumes do not lead from rest to the target",
             key="solver.outputs",
             value=list(outputs),
-            expected="volumes in order, the last equal to control.target",
+            expected=f"volumes in order from {100.0 * begin / rest:.5g} %, the last equal to control.target",
         )
     return [*volumes[:-1], target]
 

@@ -19,6 +19,7 @@ from turgor.common.units import from_internal
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
+from turgor.results.files import UnwritableError
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore
@@ -206,16 +207,20 @@ class _Running:
         except SolverError as error:
             log.error("%s %s", error, error.facts)
             return error
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as signal:
             log.warning("interrupted")
-            raise KeyboardInterrupt(
+            raise type(signal)(
                 f"interrupted; {store.n_steps} finished steps are in {self.folder}, and --resume continues behind them"
             ) from None
         return None
 
     def _keep(self, recorder: Recorder, store: RunStore, equilibrium: Equilibrium) -> None:
         record = recorder.record(equilibrium)
-        store.append(record)
+        try:
+            store.append(record)
+        except UnwritableError as error:
+            kept = f"a folder with room; {store.n_steps} finished steps are kept, and --resume continues behind them"
+            raise InputError(error.problem, file=error.file, expected=kept) from error
         recorder.begin()
         text = ", ".join(_load_text(name, value) for name, value in record.loads.items())
         log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
@@ -244,7 +249,7 @@ class _Running:
             store.history,
             store.mesh,
             converged=stop is None,
-            reason=str(stop) if stop else _reached(store.history),
+            reason=_stopped(stop, store.history) if stop else _reached(store.history),
             outcome=_outcome(stop, store.history),
             dofs=system.n_dofs,
             wall_s=time.perf_counter() - self.begun,
@@ -259,6 +264,13 @@ def _outcome(stop: SolverError | None, history: Sequence[Row]) -> Outcome:
         return stop.outcome if isinstance(stop, StoppedShortError) else Outcome.UNEXPLAINED
     bifurcated = bool(history) and history[-1]["stable"] is False and _bifurcation(history) is not None
     return Outcome.BIFURCATION if bifurcated else Outcome.REACHED
+
+
+def _stopped(stop: SolverError, history: Sequence[Row]) -> str:
+    met = _bifurcation(history)
+    if met is None or history[-1]["stable"] is not False:
+        return str(stop)
+    return f"{stop}. Before, at {_place(met)}, the path bifurcates, and the states behind it are unstable"
 
 
 def _reached(history: Sequence[Row]) -> str:

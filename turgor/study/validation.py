@@ -106,7 +106,9 @@ def _words(finding: ErrorDetails) -> tuple[str, object, str | None]:
     if kind == "union_tag_not_found" and isinstance(value, dict):
         return "this key is missing", None, f"the {_tag_key(finding)}"
     if kind == "too_short":
-        return "this is empty", None, "at least one entry"
+        least, found = context["min_length"], context["actual_length"]
+        problem = f"this has {found} of at least {least} entries" if found else "this is empty"
+        return problem, None, f"at least {'one entry' if least == 1 else f'{least} entries'}"
     problem = "this key has no value" if value is None else "this value does not fit"
     return problem, value, _EXPECTED.get(kind) or context.get("expected") or _rest(message)
 
