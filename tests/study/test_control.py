@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -24,6 +25,7 @@ from turgor.study.case import load_case
 from turgor.study.control import VolumeControl
 from turgor.study.course import course_by
 from turgor.study.run import Run, run
+from turgor.study.states import Recorder
 
 FREE = "loads=[{type: pressure, cavity: cavity}]"
 SURROUNDINGS = 101.325
@@ -149,11 +151,26 @@ def test_where_a_pressure_falls_below_a_vacuum_the_run_says_so_once(
     assert done.converged
 
 
+def test_a_cavity_that_encloses_less_than_nothing_is_told_of_once(
+    small_tube: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    recorded = Recorder.record
+    monkeypatch.setattr(Recorder, "record", lambda *told: replace(recorded(*told), cavity_volumes={"cavity": -1.0}))
+    ran(small_tube, "loads.0.value=4 kPa", "solver.steps=2")
+    told = [record.message for record in caplog.records if "less than nothing" in record.message]
+    assert told == [
+        "cavity encloses less than nothing at step 0: its walls have passed through each other, which contact: true "
+        "would not let them"
+    ]
+
+
 @pytest.mark.slow
 def test_a_run_that_stopped_at_a_limit_stops_there_again(small_tube: Path) -> None:
     changes = ["loads.0.value=36 kPa", "solver={outputs: [30 kPa, 36 kPa]}"]
     done, rows = ran(small_tube, *changes)
     assert [row["event"] for row in rows] == ["", "limit-pressure"]
+    with pytest.raises(tg.InputError, match="only one of the two"):
+        run(load_case(small_tube, changes), done.folder, resume=True, overwrite=True)
     again = run(load_case(small_tube, changes), done.folder, resume=True)
     assert (again.summary["outcome"], again.summary["reason"]) == ("limit-pressure", done.summary["reason"])
     assert RunStore.open(done.folder).n_steps == 2

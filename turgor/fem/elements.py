@@ -13,12 +13,9 @@ from numpy.typing import NDArray
 
 from turgor.fem import kernels
 from turgor.fem.section import Axisymmetric, Section, depth
-from turgor.mesh.cells import CELLS, Cell, face_cell, inverses, jacobians
+from turgor.mesh.cells import Cell, inverses, jacobians
 
 Floats = NDArray[np.float64]
-
-TET10 = CELLS["tet10"]
-TRI6 = face_cell(TET10.faces)
 
 
 def reference_gradients(nodes: Floats, cell: Cell, section: Section | None) -> tuple[Floats, Floats]:

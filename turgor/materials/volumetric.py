@@ -87,7 +87,9 @@ class Logarithmic(Volumetric):
 
     @override
     def pressure(self, J: Array) -> Array:
-        return self.bulk_modulus * np.log(J)
+        # Far off, a step may predict a negative dilatation; that its forces are no numbers ends it.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.bulk_modulus * np.log(J)
 
     @override
     def stiffness(self, J: Array) -> Array:

@@ -24,7 +24,7 @@ from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.tangent import factorise_tangent
-from turgor.solver.volume import LimitPoint, VolumeWalk, compliance, is_monotone, softest_mode
+from turgor.solver.volume import CUT, EASY, LimitPoint, VolumeWalk, compliance, is_monotone, softest_mode
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
@@ -32,10 +32,7 @@ log = logger("solver")
 
 Floats = NDArray[np.float64]
 
-CUT = 0.4
 GROWTH = 1.6
-EASY = 5
-"""A step that took no more factorisations than this lets the next one grow."""
 
 FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
@@ -71,7 +68,8 @@ class PathOptions:
     newton
         Tolerance and iteration limit of each equilibrium.
     largest_step, smallest_step
-        Bounds of a step in load fraction. The walk ends where not even the smallest step finds an equilibrium.
+        Bounds of a step in load fraction. One that ends at a fraction asked for may be a fifth longer; the walk ends
+        where the next one would be shorter.
     post_snap
         Whether to go on behind a limit from where the actuator snaps to: the state under the same loads. Otherwise the
         walk ends at a limit.

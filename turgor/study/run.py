@@ -100,10 +100,12 @@ def run(
     ------
     InputError
         If the case cannot be run as it stands, the folder holds a run and neither `resume` nor `overwrite` is
-        asked for, or the run to resume is one of another case.
+        asked for, or both are, or the run to resume is one of another case.
     KeyboardInterrupt
         Passed on with a message that says how to resume.
     """
+    if resume and overwrite:
+        raise InputError("a run is either resumed or overwritten", key="--resume", expected="only one of the two")
     place = Path(folder)
     stored = (place / MARK).is_file()
     if stored and not (resume or overwrite):
@@ -119,7 +121,7 @@ class _Running:
     def __init__(self, case: Case, folder: Path, show: Progress, run_log: RunLog) -> None:
         self.case, self.folder, self.show, self.run_log = case, folder, show, run_log
         self.begun = time.perf_counter()
-        self._below_vacuum = False
+        self._doubted: set[str] = set()
         self.files = data_names(case)
 
     def run(self, *, continues: bool) -> Run:
@@ -226,20 +228,30 @@ class _Running:
         log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
         if equilibrium.event is not None:
             log.warning("%s at %s", equilibrium.event, text)
-        self._warn_of_vacuum(record)
+        self._doubt(record)
         self.show.advance(record.fraction, text)
 
-    def _warn_of_vacuum(self, record: StepRecord) -> None:
-        """Say once where a pressure that follows from what is prescribed is less than nothing."""
-        deeper = [name for name, value in record.loads.items() if name.startswith(PRESSURE) and value < -ATMOSPHERE]
-        if deeper and not self._below_vacuum:
-            self._below_vacuum = True
-            text = (
-                f"{_load_text(deeper[0], record.loads[deeper[0]])} at step {record.index} is deeper than a vacuum: "
-                "no cavity of air gets there, and beyond it the states are those of a liquid at best"
-            )
-            log.warning(text)
-            self.show.warn(text)
+    def _doubt(self, record: StepRecord) -> None:
+        """Say, each once, where a state is an equilibrium but none of air in a cavity."""
+        doubts = {
+            "vacuum": (
+                f"{_load_text(name, value)} at step {record.index} is deeper than a vacuum: no cavity of air gets there"
+                for name, value in record.loads.items()
+                if name.startswith(PRESSURE) and value < -ATMOSPHERE
+            ),
+            "volume": (
+                f"{name} encloses less than nothing at step {record.index}: its walls have passed through each other, "
+                "which contact: true would not let them"
+                for name, volume in record.cavity_volumes.items()
+                if volume < 0.0
+            ),
+        }
+        for kind, texts in doubts.items():
+            text = next(texts, None)
+            if text is not None and kind not in self._doubted:
+                self._doubted.add(kind)
+                log.warning(text)
+                self.show.warn(text)
 
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
