@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import arch, neo_hookean
+from samples import arch, neo_hookean, sphere
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.spec import RigidContact
@@ -16,7 +16,7 @@ from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import quarter_ring, rectangle, shell_octant
-from turgor.solver.control import Volume
+from turgor.solver.control import ATMOSPHERE, Air, Volume
 from turgor.solver.events import Event
 from turgor.solver.follow import follow, follow_arc
 from turgor.solver.newton import Equilibrium
@@ -113,10 +113,10 @@ def test_a_load_just_below_the_limit_is_reached(part, steps):
     assert (end.fraction, end.stable, end.event) == (1.0, True, None)
     # An inflated sphere, on which the volume's own step passes the load and the limit behind it.
     ring = quarter_ring(1.0, 1.5, 2)
-    sphere = System(
+    balloon = System(
         ring, {"body": neo_hookean()}, [Sliding("y0")], [Pressure("inner", part * 0.0493473)], section=Axisymmetric()
     )
-    end = solve_path(sphere, output_fractions(steps))[-1]
+    end = solve_path(balloon, output_fractions(steps))[-1]
     assert (end.fraction, end.stable, end.event) == (1.0, True, None)
 
 
@@ -174,6 +174,23 @@ def test_a_bifurcation_by_volume_is_told():
     assert [e.event for e in found if e.event] == [Event.BIFURCATION]
     assert found[first].event == Event.BIFURCATION
     assert np.abs(found[first].mode).max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("full", [1e-3, 1.0, -0.01])
+def test_a_given_amount_of_air_takes_few_steps_whatever_the_size_and_the_sign_of_the_load(full):
+    system = sphere("hex27", 1, pressure=full)
+    rest = system.conjugate(system.reference_state(), ONE)
+    air = Air(full, ATMOSPHERE, full * ONE)
+    told: list[float] = []
+    found = follow(
+        system,
+        air,
+        [ATMOSPHERE * rest * times for times in (1.5, 3.0, 8.0)],
+        on_progress=lambda *how: told.append(how[0]),
+    )
+    assert events(found) == [(Event.LIMIT, pytest.approx(0.0493, rel=2e-3))]
+    assert [stable_while_held(system, air, e) for e in found] == [True] * 4
+    assert len(told) < 15
 
 
 @pytest.mark.parametrize("along", ["volume", "arc"])

@@ -158,8 +158,10 @@ class VolumeWalk:
 
     def measure(self, equilibrium: Equilibrium) -> float:
         """Return the quantity at an equilibrium."""
-        conjugate = self.system.conjugate(equilibrium.state, self.quantity.weights)
-        return self.quantity.value(conjugate, equilibrium.fraction)
+        return self.quantity.value(self._conjugate(equilibrium), equilibrium.fraction)
+
+    def _conjugate(self, equilibrium: Equilibrium) -> float:
+        return self.system.conjugate(equilibrium.state, self.quantity.weights)
 
     def at(self, value: float) -> Equilibrium:
         """Return the equilibrium at a given value of the quantity, predicted from the last ones.
@@ -198,7 +200,7 @@ class VolumeWalk:
             If the limit cannot be located; the walk then stands at `second` again.
         """
         ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
-        span = ends[1][0] - ends[0][0]
+        span = self._conjugate(second) - self._conjugate(first)
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1] * span))[2]
         third = self._earlier
         nearer = 1.0
@@ -252,8 +254,8 @@ class VolumeWalk:
         slopes = [1.0 / c for c in map(_compliance, ends) if c]
         if len(slopes) < 2 or slopes[0] * slopes[1] < 0.0:
             return False
-        change = self.measure(found) - self.measure(self.here)
-        return not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
+        change = self._conjugate(found) - self._conjugate(self.here)
+        return change == 0.0 or not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
 
 
 def is_monotone(mean: float, at_start: float, at_end: float) -> bool:
@@ -281,7 +283,7 @@ def stable_while_held(system: System, quantity: Quantity, equilibrium: Equilibri
     conjugate = system.conjugate(equilibrium.state, quantity.weights)
     control = quantity.fixed(quantity.value(conjugate, equilibrium.fraction))
     _, by_conjugate, by_fraction = control.gap(conjugate, equilibrium.fraction)
-    takes_away = signs[0] * (by_fraction + by_conjugate * equilibrium.compliance) < 0.0
+    takes_away = signs[0] * by_conjugate * (by_fraction + by_conjugate * equilibrium.compliance) < 0.0
     return bool(equilibrium.negative_pivots == takes_away)
 
 
