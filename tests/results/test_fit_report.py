@@ -37,8 +37,20 @@ def test_page_is_self_contained_and_complete(report, tmp_path):
 
 
 def test_the_yaml_gives_the_recommended_material_back(report):
-    document = yaml.safe_load(fit_report.material_yaml(report.best))
+    document = yaml.safe_load(fit_report.material_yaml(report))
     assert create(document["model"], document["constants"]).parameters == pytest.approx(report.best.parameters)
+
+
+def test_a_fitted_volume_change_goes_with_the_material():
+    x, J = np.linspace(1.0, 2.0, 20), np.linspace(1.0, 0.98, 20)
+    rubber = create("neo-hookean", {"C10": 0.05}, bulk_modulus=5.0)
+    tests = [
+        MaterialTest("uniaxial", x, rubber.uniaxial(x)),
+        MaterialTest("volumetric", J, rubber.volumetric.pressure(J)),
+    ]
+    report = fit(tests, ["neo-hookean"])
+    assert yaml.safe_load(fit_report.material_yaml(report))["bulk_modulus"].endswith(" MPa")
+    assert "bulk_modulus" not in fit_report.material_yaml(fit(tests[0], ["neo-hookean"]))
 
 
 def test_curves_show_data_and_every_model(report):

@@ -197,6 +197,22 @@ def test_kill_9_loses_no_finished_step(tmp_path: Path, wait: int, small_finger: 
         store.append(bent_record(small_finger, store.n_steps, 1.0))
 
 
+@pytest.mark.parametrize("name", ["case.yaml", "fit.json", "curves/force.csv", "data/force.csv"])
+def test_what_no_run_has_written_is_not_replaced(tmp_path: Path, small_finger: Mesh, name: str) -> None:
+    measured = tmp_path / "force.csv"
+    measured.write_text("measured", encoding="utf-8")
+    folder = tmp_path / "mine"
+    own = folder / name
+    own.parent.mkdir(parents=True)
+    own.write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=f"{name}: this file is no run's"):
+        RunStore.create(folder, small_finger, {}, files={measured: "data/force.csv"}, overwrite=True)
+    assert own.read_text(encoding="utf-8") == "mine"
+    own.unlink()
+    RunStore.create(folder, small_finger, {}, overwrite=True).close()
+    RunStore.create(folder, small_finger, {}, overwrite=True).close()
+
+
 def test_two_runs_cannot_write_one_folder(tmp_path: Path, small_finger: Mesh) -> None:
     folder = started_run(tmp_path / "run", small_finger, 1)
     with RunStore.resume(folder):

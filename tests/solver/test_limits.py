@@ -20,7 +20,7 @@ from turgor.solver.control import ATMOSPHERE, Air, Volume
 from turgor.solver.events import Event
 from turgor.solver.follow import follow, follow_arc
 from turgor.solver.newton import Equilibrium
-from turgor.solver.path import LimitPressureError, PathOptions, output_fractions, solve_path
+from turgor.solver.path import LimitPressureError, PathOptions, StoppedShortError, output_fractions, solve_path
 from turgor.solver.volume import is_monotone, stable_while_held
 
 ONE = np.ones(1)
@@ -77,6 +77,33 @@ def test_the_arc_sets_out_from_any_state_of_the_path(full):
             end = follow_arc(system, Volume(ONE), target, 0.1, start=start)[-1]
             assert system.conjugate(end.state, ONE) == pytest.approx(target, rel=1e-6)
             assert end.fraction == pytest.approx(whole[-1].fraction, rel=1e-5)
+
+
+@pytest.mark.parametrize("steps", [1, 4, 20])
+def test_where_the_volume_turns_back_no_step_lands_on_another_branch_unnoticed(steps):
+    system = arch(1.0, rise=1.5)
+    found: list[Equilibrium] = []
+    with pytest.raises(StoppedShortError, match="arc-length"):
+        follow(system, Volume(ONE), volumes(system, 20.0, steps), on_equilibrium=found.append)
+    assert events(found) == [(Event.LIMIT, pytest.approx(1.99420e-4, rel=1e-4))]
+    assert all(stable_while_held(system, Volume(ONE), e) for e in found)
+
+
+def test_an_arc_that_leads_back_ends():
+    system = arch(4e-4, rise=1.5)
+    with pytest.raises(StoppedShortError, match="leads back past where it began"):
+        follow_arc(system, Volume(ONE), volumes(system, 20.0, 1)[-1], 0.2)
+
+
+@pytest.mark.parametrize("steps", [1, 10])
+def test_a_plate_that_moves_is_no_jump(steps):
+    plate = RigidContact(Plane((0.0, 0.0, 1.6), (0.0, 0.0, -1.0)), surface="outer", motion=(0.0, 0.0, -0.4))
+    held = [Sliding("x0"), Sliding("y0"), Sliding("z0")]
+    loads = [Pressure("inner", 0.001)]
+    system = System(shell_octant(1.0, 1.5, 1), {"body": neo_hookean()}, held, loads, contact=[plate])
+    found = solve_path(system, output_fractions(steps))
+    assert found[-1].fraction == 1.0
+    assert sum(e.factorisations for e in found) < 60
 
 
 def test_friction_and_a_volume_do_not_go_together():

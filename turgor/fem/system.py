@@ -120,8 +120,8 @@ class System:
             *bodies,
             *self.contacts,
         )
-        pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
-        self._loaded: tuple[Loaded, ...] = (*self.cavities, *caps, *dead, *pushed)
+        self._pushed = [c for c in self.contacts if isinstance(c, Obstacle) and c.moves]
+        self._loaded: tuple[Loaded, ...] = (*self.cavities, *caps, *dead, *self._pushed)
 
         self._couplings: list[Ints] = [c.couplings(self._rest) for c in self.contacts]
         self._touching: list[tuple[Ints, Floats]] = []
@@ -269,6 +269,11 @@ class System:
         """Return the state of displacement `u` in which nothing lags."""
         bare = State(u, (), loads, penalty, grips, margin)
         return replace(bare, lagged=tuple(term.lagged_at(bare) for term in self.terms))
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether displacements or places of rigid bodies grow with the load: they move its conjugate by themselves."""
+        return self.constraints.moves or bool(self._pushed)
 
     @property
     def rubs(self) -> bool:

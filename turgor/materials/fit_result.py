@@ -175,6 +175,11 @@ class FitReport:
         return material
 
     @property
+    def measured_volume(self) -> bool:
+        """Whether a test tells how the volume changes, so that the bulk modulus is fitted too."""
+        return any(test.mode == "volumetric" or test.lateral is not None for test in self.tests)
+
+    @property
     def largest_stress(self) -> float:
         """Largest measured nominal stress in MPa."""
         return max(float(np.abs(test.stress).max()) for test in self.tests)

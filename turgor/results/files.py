@@ -18,6 +18,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
+LOCK = ".lock"
 PARTIAL = ".part"
 """Suffix of a file that is still being written."""
 
@@ -106,7 +107,7 @@ class FolderLock:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._stream = (folder / ".lock").open("a+b")
+        self._stream = (folder / LOCK).open("a+b")
         try:
             if sys.platform == "win32":
                 msvcrt.locking(self._stream.fileno(), msvcrt.LK_NBLCK, 1)

@@ -14,7 +14,6 @@ from plotly.subplots import make_subplots
 
 from turgor.materials.assessment import stability_map
 from turgor.materials.fit_result import Fit, FitReport
-from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.kinematics import Array
 from turgor.materials.least_squares import predict
 from turgor.materials.measurement import MaterialTest
@@ -66,7 +65,7 @@ def write_fit_page(report: FitReport, path: str | Path) -> Path:
                 "modes": Drawing("modes", _json(other_modes(report))),
                 "map": Drawing("map", _json(stability(report))) if report.recommended else None,
             },
-            yaml=material_yaml(report.best) if report.recommended else "",
+            yaml=material_yaml(report) if report.recommended else "",
         )
     )
     target = Path(path)
@@ -74,13 +73,21 @@ def write_fit_page(report: FitReport, path: str | Path) -> Path:
     return target
 
 
-def material_yaml(material: Hyperelastic) -> str:
-    """Return the lines that a case file takes for this material."""
+def material_yaml(report: FitReport) -> str:
+    """Return the lines that a case file takes for the recommended material.
+
+    Raises
+    ------
+    InputError
+        If the fit recommends none.
+    """
+    material = report.best
     constants = {
         constant.name: f"{value!r} {constant.unit}" if constant.unit else value
         for constant, value in zip(material.constants(), material.parameters.values(), strict=True)
     }
-    return yaml.safe_dump({"model": material.name, "constants": constants}, sort_keys=False)
+    volume = {"bulk_modulus": f"{material.bulk_modulus!r} MPa"} if report.measured_volume else {}
+    return yaml.safe_dump({"model": material.name, "constants": constants, **volume}, sort_keys=False)
 
 
 def curves(report: FitReport) -> go.Figure:

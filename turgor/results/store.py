@@ -43,7 +43,7 @@ from turgor.results.archive import (
     save_record,
     save_vtu,
 )
-from turgor.results.files import PARTIAL, FolderLock, json_text, read_json, read_text, write_text
+from turgor.results.files import LOCK, PARTIAL, FolderLock, json_text, read_json, read_text, write_text
 from turgor.results.history import as_csv, row
 from turgor.results.measures import Choice
 from turgor.results.record import StepRecord
@@ -58,6 +58,9 @@ _OF_LOAD = ("step", "fraction", "pressure_kPa")
 
 _STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
 _PVD, _HISTORY, _SUMMARY, _FIT, _CURVES = "result.pvd", "history.csv", "summary.json", "fit.json", "curves"
+_FILES = (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT)
+_PATTERNS = (f"{_STEPS}/*.npz", f"{_STEPS}/*.vtu", f"{_STEPS}/*{PARTIAL}", f"{_CURVES}/*.csv")
+"""What a run writes, the one that makes the folder a run's folder first."""
 
 
 class RunStore:
@@ -113,8 +116,8 @@ class RunStore:
         Raises
         ------
         InputError
-            If the folder holds a run already, is being written by another run, cannot be written, or a measure is
-            unknown or impossible on this mesh.
+            If the folder holds a run already, or files with the names of a run's that no run has written, is being
+            written by another run, cannot be written, or a measure is unknown or impossible on this mesh.
         """
         place = Path(folder)
         body = Body(mesh, section, tuple(rigid_bodies), tuple(supports))
@@ -126,12 +129,16 @@ class RunStore:
                 file=place,
                 expected="another folder, or to resume or overwrite that run",
             )
+        was_run = any((place / name).is_file() for name in (_STORE, LOCK))
+        if not was_run:
+            _check_foreign(place, files or {})
         try:
             (place / _STEPS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"the folder cannot be made: {error.strerror}", file=place) from error
         lock = FolderLock(place)
-        _remove_run(place)
+        if was_run:
+            _remove_run(place)
         text = case if isinstance(case, str) else yaml.safe_dump(dict(case), sort_keys=False, allow_unicode=True)
         write_text(place / _CASE, text)
         save_mesh(place / _MESH, mesh)
@@ -355,10 +362,27 @@ def _read_store(folder: Path) -> tuple[Body, tuple[Choice, ...]]:
     return body, measures
 
 
+def _check_foreign(folder: Path, files: Mapping[Path, str]) -> None:
+    """Refuse a folder in which a run would replace what somebody else has put there."""
+    copies = [name for path, name in files.items() if not _is_same(folder / name, path)]
+    own = [folder / name for name in (*_FILES, *copies)]
+    found = [path for path in own if path.exists()] + [path for p in _PATTERNS for path in folder.glob(p)]
+    if found:
+        raise InputError(
+            "this file is no run's, and a run would replace it",
+            file=found[0],
+            expected="another folder (--out), or the file somewhere else",
+        )
+
+
+def _is_same(copy: Path, path: Path) -> bool:
+    return copy.exists() and copy.samefile(path)
+
+
 def _remove_run(folder: Path) -> None:
-    """Remove the files of an earlier run, the one that makes the folder a run's folder first."""
-    for name in (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT):
+    """Remove the files of an earlier run."""
+    for name in _FILES:
         (folder / name).unlink(missing_ok=True)
-    for pattern in (f"{_STEPS}/*.npz", f"{_STEPS}/*.vtu", f"{_STEPS}/*{PARTIAL}", f"{_CURVES}/*.csv"):
+    for pattern in _PATTERNS:
         for path in folder.glob(pattern):
             path.unlink()

@@ -130,7 +130,7 @@ class ArcLength:
 class AlongTangent:
     """A given distance from a point of the path along its tangent there, in the plane of Q and f (Riks 1979).
 
-    For the first step: at the point itself the circle of :class:`ArcLength` has no slope.
+    It finds where the first step begins to look: at the point itself the circle of :class:`ArcLength` has no slope.
 
     Attributes
     ----------

@@ -23,9 +23,9 @@ from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, 
 from turgor.solver.path import PathOptions
 from turgor.solver.prediction import predicted
 from turgor.solver.stiffness import StiffnessSolver
-from turgor.solver.stops import stopped
+from turgor.solver.stops import ALONG_THE_ARC, stopped
 from turgor.solver.tally import Tally
-from turgor.solver.volume import SHORT_ENOUGH, LimitPoint, VolumeWalk
+from turgor.solver.volume import LimitPoint, VolumeWalk
 
 log = logger("solver")
 
@@ -90,10 +90,10 @@ def follow(
     post = _Post(walk, on_equilibrium)
     if start is None and system.loaded_at_start:
         post.send(walk.here)
-    with _telling_why(walk, post):
+    with _telling_why(walk, post, ALONG_THE_ARC if isinstance(quantity, Volume) else None):
         for target in targets:
             while sign * (target - walk.measure(walk.here)) > _rounding(target):
-                previous = walk.here
+                previous, before = walk.here, walk.before
                 found = walk.advance(target)
                 if found is None:
                     raise _nowhere(walk)
@@ -102,7 +102,13 @@ def follow(
                     part = (walk.measure(found) - begin) / (targets[-1] - begin)
                     on_progress(part, found.iterations, found.residuals[-1])
                 if previous.rising != found.rising:
-                    post.send_limit(walk.limit_between(previous, found))
+                    try:
+                        limit = walk.limit_between(previous, found)
+                    except NotConvergedError:
+                        if not walk.goes_back(previous, before):
+                            raise
+                        continue
+                    post.send_limit(limit)
                     walk.stand_at(found, previous)
                 post.send_bifurcation(previous, found)
             post.send_once(walk.here)
@@ -160,21 +166,22 @@ def follow_arc(
     with _telling_why(walk, post):
         while sign * (target - walk.measure(walk.here)) > _rounding(target):
             previous = walk.here
-            found = arc.advance()
+            found = arc.advance_to(target, sign)
             if found is None:
                 raise _nowhere(walk)
-            if sign * (walk.measure(found) - target) > 0.0:
-                found = _cut(walk, found, target)
+            if sign * (walk.measure(found) - rest) < -scale:
+                raise NotConvergedError("the path leads back past where it began")
             post.tally.count(found)
             if on_progress is not None:
                 on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
             before = walk.before
             walk.stand_at(found, previous, before)
             turns = previous.rising != found.rising
-            if turns and arc.is_flat(previous, found):
+            flat = arc.is_flat(previous, found)
+            if turns and flat:
                 post.send_limit(walk.limit_between(previous, found))
                 walk.stand_at(found, previous)
-            if not turns:
+            if flat or not turns:
                 post.send_bifurcation(previous, found)
             taken += 1
             if taken % parts == 0:
@@ -207,9 +214,21 @@ class _Arc:
         way = np.array([here.compliance / scale, 1.0])
         self.direction = sign * np.sign(way[0]) * way / np.linalg.norm(way)
 
-    def advance(self) -> Equilibrium | None:
-        """Return the next state, or ``None`` where even short steps find none."""
-        here, length = self.walk.here, self.length
+    def advance_to(self, target: float, sign: float) -> Equilibrium | None:
+        """Return the next state, that at a volume where a step would pass it; ``None`` where even short steps fail."""
+        length, direction = self.length, self.direction
+        while (found := self.advance(length)) is not None and sign * (self.walk.measure(found) - target) > 0.0:
+            try:
+                return _cut(self.walk, found, target)
+            except NotConvergedError as error:
+                self.walk.failure = error
+                self.direction = direction
+                length *= 0.5
+        return found
+
+    def advance(self, length: float) -> Equilibrium | None:
+        """Return the state behind a step of at most a length, or ``None`` where even short steps find none."""
+        here = self.walk.here
         while length >= self.walk.smallest_part * self.length:
             try:
                 found = self._at(length)
@@ -223,8 +242,7 @@ class _Arc:
                 log.info("arc-length step turned back")
                 length *= 0.5
                 continue
-            if length > SHORT_ENOUGH * self.length and self.is_flat(here, found) and self.walk.may_hide_limits(found):
-                log.info("the arc-length step may hide limits")
+            if self.is_flat(here, found) and self.walk.is_doubtful(found, length / self.length):
                 length *= 0.5
                 continue
             self.direction = way / np.linalg.norm(way)
@@ -242,14 +260,19 @@ class _Arc:
         walk = self.walk
         here, before = walk.here, walk.before
         guess, aim = here.state, here.fraction + length * float(self.direction[1])
-        place = (walk.measure(here), here.fraction, self.scale)
-        control: Control = AlongTangent(*place, self.direction, length, walk.quantity.weights)
-        if before is not None:
+        place, weights = (walk.measure(here), here.fraction, self.scale), walk.quantity.weights
+        if before is None:
+            found = self._found(AlongTangent(*place, self.direction, length, weights), guess, aim)
+            guess, aim = found.state, found.fraction
+        else:
             reach = length / float(np.linalg.norm(self._way(here, before)))
             guess, part = predicted(walk.system, (-1.0, 0.0), (before.state, here.state), reach)
             if part > 0.0:
                 aim = here.fraction + part * reach * (here.fraction - before.fraction)
-            control = ArcLength(*place, length, walk.quantity.weights)
+        return self._found(ArcLength(*place, length, weights), guess, aim)
+
+    def _found(self, control: Control, guess: State, aim: float) -> Equilibrium:
+        walk = self.walk
 
         def find(state: State) -> Equilibrium:
             return find_equilibrium(walk.system, walk.linear, state, aim, walk.options, control=control)
@@ -311,7 +334,7 @@ def _walk_from(system: System, quantity: Quantity, options: PathOptions, start: 
     try:
         return VolumeWalk(system, linear, here, 1.0, options.newton, quantity, smallest_part=options.smallest_step)
     except NotConvergedError as error:
-        raise stopped(system, here, error, by_load=False) from error
+        raise stopped(system, here, error, instead=None) from error
 
 
 def settled(system: System, linear: StiffnessSolver, options: NewtonOptions) -> Equilibrium:
@@ -328,7 +351,7 @@ def settled(system: System, linear: StiffnessSolver, options: NewtonOptions) -> 
     try:
         return kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, options), rest.state)
     except NotConvergedError as error:
-        raise stopped(system, rest, error, by_load=False) from error
+        raise stopped(system, rest, error, instead=None) from error
 
 
 def _direction(begin: float, targets: Sequence[float], going_on: bool) -> float:
@@ -355,12 +378,12 @@ def _nowhere(walk: VolumeWalk) -> NotConvergedError:
 
 
 @contextlib.contextmanager
-def _telling_why(walk: VolumeWalk, post: _Post) -> Iterator[None]:
-    """Where the solver stops, hand out the last equilibrium that the walk found and say why there is none beyond."""
+def _telling_why(walk: VolumeWalk, post: _Post, instead: str | None = None) -> Iterator[None]:
+    """Where the solver stops, hand out the last equilibrium found; say why there is none beyond, and what `instead`."""
     try:
         yield
     except SolverError as error:
         post.send_once(walk.here)
         if isinstance(error, NotConvergedError):
-            raise stopped(walk.system, walk.here, error, by_load=False) from error
+            raise stopped(walk.system, walk.here, error, instead=instead) from error
         raise

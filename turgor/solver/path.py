@@ -240,12 +240,12 @@ class _Walk:
     def _may_have_jumped(self, found: Equilibrium) -> bool:
         """Whether a step may have passed over a limit, to a branch behind it.
 
-        The load is a smooth function of its conjugate, also through limits, where nothing else grows with it, such as
-        given displacements, which move the conjugate by themselves. Its slopes are the inverse compliances
+        The load is a smooth function of its conjugate, also through limits, where nothing grows with it that moves the
+        conjugate by itself. Its slopes are the inverse compliances
         (:func:`turgor.solver.volume.is_monotone`). They are asked for only where the conjugate has changed much.
         """
         system, linear, here = self.system, self.linear, self.here
-        if system.constraints.moves:
+        if system.is_moved:
             return False
         growth = system.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
@@ -316,13 +316,18 @@ class _Walk:
         if step == 0.0:
             return None
         walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton, quantity)
-        previous = walk.here
+        previous, before = walk.here, None
         for found in itertools.islice(walk, VOLUME_STEPS):
             self._tally.count(found)
             if self.on_progress is not None:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
             if previous.rising and not found.rising:
-                limit = walk.limit_between(previous, found)
+                try:
+                    limit = walk.limit_between(previous, found)
+                except NotConvergedError:
+                    if not walk.goes_back(previous, before):
+                        raise
+                    continue
                 if limit.equilibrium.fraction >= target:
                     return self._below(walk, target, previous, limit)
                 return self._passed(walk, limit, found)
@@ -333,6 +338,7 @@ class _Walk:
                     return None
             if walk.is_stable(found) is False and walk.is_stable(previous) is not False:
                 found = self._bifurcated(found)
+            before = previous
             self.past, self.here = (*self.past, previous)[-2:], found
             if found.event:
                 self.deliver()

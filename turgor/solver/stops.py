@@ -19,6 +19,9 @@ from turgor.solver.volume import LimitPoint
 
 Facts = dict[str, object]
 
+BY_VOLUME = "by volume (control.type: volume)"
+ALONG_THE_ARC = "along the path (control.type: arc-length), as the volume may turn back"
+
 CREASED = 2.4
 """Stretch along the normal of a free surface, over the smallest one in it, beyond which rubber folds into creases.
 
@@ -81,13 +84,15 @@ class Fold:
         return self.stretches[2] / self.stretches[0]
 
 
-def stopped(system: System, here: Equilibrium, error: NotConvergedError, *, by_load: bool = True) -> StoppedShortError:
+def stopped(
+    system: System, here: Equilibrium, error: NotConvergedError, *, instead: str | None = BY_VOLUME
+) -> StoppedShortError:
     """Return the error for a path on which nothing was found beyond `here`, with the most likely reason.
 
-    `by_load` says whether the load was given, so that to prescribe a volume may help.
+    `instead` is what else could be prescribed to get on.
     """
     facts = load_facts(system, here)
-    outcome, cause, advice, details = _cause(system, here, error, by_load=by_load)
+    outcome, cause, advice, details = _cause(system, here, error, instead)
     return StoppedShortError(
         f"no equilibrium was found beyond {load_text(facts)} ({error.reason}); {cause}",
         advice=advice,
@@ -186,7 +191,7 @@ def deepest_fold(system: System, here: Equilibrium) -> Fold | None:
 
 
 def _cause(
-    system: System, here: Equilibrium, error: NotConvergedError, *, by_load: bool
+    system: System, here: Equilibrium, error: NotConvergedError, instead: str | None
 ) -> tuple[Outcome, str, str, Facts]:
     """Return the class of a failure, the cause in words, what to try, and the facts that speak for it."""
     overlap = error.facts.get("overlap_per_wall")
@@ -214,8 +219,8 @@ def _cause(
         return Outcome.CONTACT, cause, advice, {"contact_area_mm2": area}
     cause = "the material and the elements are sound there"
     advice = "Try smaller steps (solver.largest_step, solver.smallest_step) or a finer mesh"
-    if by_load and system.cavities and not (system.constraints.moves or system.rubs):
-        advice += ", or control by volume (control.type: volume)"
+    if instead and system.cavities and not (system.constraints.moves or system.rubs):
+        advice += f", or control {instead}"
     return Outcome.UNEXPLAINED, cause, advice, {"smallest_drucker_margin": worst.margin, "smallest_det_F": smallest}
 
 

@@ -45,8 +45,14 @@ SMALLEST_PART = 1e-3
 """A failed step is cut by this, but not below this part of the first one."""
 
 MONOTONE = 3.0
-SHORT_ENOUGH = 0.05
+SHORT_ENOUGH = 0.01
 """Part of the first step below which a step is not shortened for what it may hide."""
+
+FEW_CUTS = 4.0
+"""So many smallest steps long, one that ends in an unstable state is tried shorter: it may be on another branch."""
+
+STEEP = 1e-3
+"""A state is no limit where the load changes by more than this part of itself over the step that holds it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +148,7 @@ class VolumeWalk:
                 self.failure = error
                 self.step = CUT * (aim - now)
                 continue
-            if abs(aim - now) > SHORT_ENOUGH * abs(self.first_step) and self.may_hide_limits(found):
-                log.info("the volume step may hide limits")
+            if self.is_doubtful(found, abs((aim - now) / self.first_step)):
                 self.step = CUT * (aim - now)
                 continue
             if found.factorisations <= EASY:
@@ -151,6 +156,28 @@ class VolumeWalk:
             self._earlier, self.before, self.here = self.before, self.here, found
             return found
         return None
+
+    def is_doubtful(self, found: Equilibrium, part: float) -> bool:
+        """Whether a shorter step should be tried, for what this one may hide or where it may have landed.
+
+        `part` is its length over that of the first one.
+        """
+        if part > SHORT_ENOUGH and self._may_hide_limits(found):
+            log.info("the step may hide limits")
+            return True
+        lost = self.is_stable(found) is False and self.is_stable(self.here) is not False
+        if lost and part > FEW_CUTS * self.smallest_part:
+            log.info("the step ended in an unstable state")
+            return True
+        return False
+
+    def goes_back(self, here: Equilibrium, before: Equilibrium | None) -> bool:
+        """Stand at an earlier equilibrium again and make the next step shorter; no if it would be too short."""
+        self.step = CUT * (self.measure(self.here) - self.measure(here))
+        if abs(self.step) < self.smallest_part * abs(self.first_step):
+            return False
+        self.stand_at(here, before)
+        return True
 
     def stand_at(self, here: Equilibrium, before: Equilibrium | None, earlier: Equilibrium | None = None) -> None:
         """Go on from an equilibrium, predicting from it and one or two others."""
@@ -197,13 +224,13 @@ class VolumeWalk:
         Raises
         ------
         NotConvergedError
-            If the limit cannot be located; the walk then stands at `second` again.
+            If the limit cannot be located, or the two lie on different branches; the walk stands at `second` again.
         """
         ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
         span = self._conjugate(second) - self._conjugate(first)
         best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1] * span))[2]
         third = self._earlier
-        nearer = 1.0
+        nearer, slope = 1.0, np.inf
         for _ in range(30):
             (q0, s0, e0), (q1, s1, e1) = ends
             self.stand_at(e1, e0, third)
@@ -225,6 +252,9 @@ class VolumeWalk:
             ends[dropped] = (aim, slope, best)
             if abs(slope * span) <= tolerance * abs(best.fraction):
                 break
+        if abs(slope * span) > STEEP * abs(best.fraction):
+            self.stand_at(second, first)
+            raise NotConvergedError(f"the path jumps near {best.fraction:.4g} of the load, where a limit was expected")
         return LimitPoint(best, ends[0][1] * self._sense > 0.0, self.softest_mode(best))
 
     def softest_mode(self, equilibrium: Equilibrium) -> Floats:
@@ -248,7 +278,7 @@ class VolumeWalk:
         weights = self.quantity.weights
         return -1.0 if weights is not None and weights @ self.line.growth < 0.0 else 1.0
 
-    def may_hide_limits(self, found: Equilibrium) -> bool:
+    def _may_hide_limits(self, found: Equilibrium) -> bool:
         """Whether the load may have a maximum and a minimum on the way to a state, both hidden."""
         ends = (self.here, found)
         slopes = [1.0 / c for c in map(_compliance, ends) if c]

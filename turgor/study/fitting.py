@@ -46,7 +46,7 @@ def write_material(report: FitReport, path: str | Path) -> None:
     InputError
         If the file cannot be written.
     """
-    text = material_yaml(report.best)
+    text = material_yaml(report)
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -150,9 +150,14 @@ class FittedMaterial(_Compressible):
         )
 
     def build(self, report: FitReport) -> Hyperelastic:
-        """Return the recommended material of the fit with the volume change and density asked for here."""
-        best = report.best
-        return create(best.name, best.parameters, **self.volume_change())
+        """Return the recommended material of the fit with the density asked for here.
+
+        So with the compressibility; where none is, with that of the tests if they tell it.
+        """
+        best, asked = report.best, self.volume_change()
+        if report.measured_volume and all(asked[key] is None for key in ("bulk_modulus", "D1", "poisson")):
+            asked["bulk_modulus"] = best.bulk_modulus
+        return create(best.name, best.parameters, **asked)
 
 
 _KINDS: dict[str, type[StrictModel]] = {"library": LibraryMaterial, "model": ModelMaterial, "fit": FittedMaterial}

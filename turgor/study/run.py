@@ -45,6 +45,9 @@ log = logger("study")
 PRESSURE = "pressure:"
 """What the names of pressures begin with (:attr:`turgor.fem.system.System.load_names`)."""
 
+SAME = 1e-3
+"""Two limits whose loads differ by less than this part are one."""
+
 MARK = "store.json"
 """The file that makes a folder a run's folder; see :mod:`turgor.results.store`."""
 
@@ -187,10 +190,10 @@ class _Running:
 
     def _walk(self, system: System, course: Course, store: RunStore) -> SolverError | None:
         """Follow the path; return what stopped it short, or ``None`` if it reached the end."""
-        last, known = store.last(), list[str]()
+        last, known = store.last(), list[StepRecord]()
         while last and last.solver["event"] in (Event.LIMIT, Event.MINIMUM):
             # The path cannot be taken up at a limit, where it has no direction: from before, the limit is met again.
-            known.insert(0, last.solver["event"])
+            known.insert(0, last)
             last = store.load(last.index - 1) if last.index else None
         if last and last.fraction >= 1.0 and not known:
             return None
@@ -199,7 +202,7 @@ class _Running:
         recorder = Recorder(system, store.n_steps, course)
 
         def keep(equilibrium: Equilibrium) -> None:
-            if known and equilibrium.event == known[0]:
+            if known and _is_same(equilibrium, known[0]):
                 del known[0]  # in the store already
             else:
                 self._keep(recorder, store, equilibrium)
@@ -269,6 +272,12 @@ class _Running:
         )
         last = store.last()
         return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})
+
+
+def _is_same(found: Equilibrium, known: StepRecord) -> bool:
+    """Whether a limit is the one that a record was made of."""
+    there = float(known.solver["load_fraction"])
+    return found.event == known.solver["event"] and abs(found.fraction - there) <= SAME * abs(there)
 
 
 def _outcome(stop: SolverError | None, history: Sequence[Row]) -> Outcome:

@@ -109,10 +109,16 @@ def test_each_state_is_the_end_of_a_step(ball, octant):
     assert max(len(word) for line in text.splitlines() if line[0].isdigit() for word in line.split(", ")) <= 20
 
 
+SWELLING = {"type": "pressure"}
+UP = {"time": ["0 s", "1 s"], "pressure": ["0 kPa", "5 kPa"]}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"contact": True}, "contact: this is not written for CalculiX"),
+        ({"loads": [SWELLING], "control": {"type": "volume", "target": "150 %"}}, r"control\.type: this is not"),
+        ({"loads": [{**SWELLING, "programme": UP}]}, r"loads\.0\.programme: this is not written"),
         ({"supports": [{"type": "elastic", "surface": "x0", "stiffness": "1 N/mm^3"}]}, "a bed of springs"),
         ({"supports": [{"type": "sliding", "surface": "outer"}]}, r"supports\.0\.surface: a sliding surface"),
     ],

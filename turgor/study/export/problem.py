@@ -14,8 +14,10 @@ from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.materials import Hyperelastic
 from turgor.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
+from turgor.study.boundary import PressureCase
 from turgor.study.build import every_region, system_of
 from turgor.study.case import Case
+from turgor.study.control import PressureControl
 
 Vector = tuple[float, float, float]
 
@@ -81,6 +83,13 @@ def problem_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic], pr
     for key in ("contact", "fibres", "sheets", "fibre_families"):
         if getattr(case, key):
             raise InputError(f"this is not written for {program}", key=key, expected=f"a case without {key}")
+    if not isinstance(case.control, PressureControl):
+        raise InputError(
+            f"this is not written for {program}", key="control.type", value=case.control.type, expected="pressure"
+        )
+    for number, load in enumerate(case.loads):
+        if isinstance(load, PressureCase) and load.programme is not None:
+            raise InputError(f"this is not written for {program}", key=f"loads.{number}.programme", expected="a value")
     if mesh.cell_type != "tet10":
         raise InputError(
             f"a mesh of these cells is not written for {program}", value=mesh.cell_type, expected="tetrahedra in space"
@@ -89,15 +98,15 @@ def problem_of(case: Case, mesh: Mesh, materials: Mapping[str, Hyperelastic], pr
     held = tuple(part for number in range(len(case.supports)) for part in _held(case, number, mesh, program))
     # What a run would refuse (a body that is not held, an open cavity) is refused here in the same words.
     system_of(case, mesh, materials)
-    loads = [load.build() for load in case.loads]
-    weights = [np.array(load.acceleration) for load in loads if isinstance(load, Gravity)]
+    built = [load.build() for load in case.loads]
+    weights = [np.array(load.acceleration) for load in built if isinstance(load, Gravity)]
     return Problem(
         name=case.name,
         mesh=mesh,
         materials=materials,
         held=held,
-        pressures=tuple(load for load in loads if isinstance(load, Pressure)),
-        tractions=tuple(_as_traction(load, mesh) for load in loads if isinstance(load, (Traction, Force))),
+        pressures=tuple(load for load in built if isinstance(load, Pressure)),
+        tractions=tuple(_as_traction(load, mesh) for load in built if isinstance(load, (Traction, Force))),
         weight=_vector(np.sum(weights, axis=0)) if weights else None,
         fractions=case.fractions(),
     )
