@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
-from turgor.materials.measurement import Specimen
+from turgor.materials.measurement import MaterialTest, Specimen
 from turgor.materials.testdata import read_tests
 
 STRETCH = np.linspace(1.0, 3.0, 21)
@@ -66,6 +66,32 @@ def test_decimal_comma(tmp_path, sep):
     check(read_one(write(tmp_path, table(f"strain{sep}stress (MPa)", STRETCH - 1, STRESS, sep=sep, comma=True))))
 
 
+def test_one_comma_that_is_decimal_shows_that_all_are(tmp_path):
+    lines = [f"1,{i}25;{i},{i}25" for i in range(1, 8)]
+    test = read_one(write(tmp_path, "\n".join(["stretch;stress (MPa)", "1,050;0,125", *lines])))
+    assert test.stretch[:2] == pytest.approx([1.05, 1.125])
+    assert test.stress[:2] == pytest.approx([0.125, 1.125])
+
+
+@pytest.mark.parametrize("header", ["strain;stress (MPa)", "strain;stress (MPa);;"])
+def test_empty_cells_beyond_the_header_are_nothing(tmp_path, header):
+    rows = table("", STRETCH - 1, STRESS, sep=";").strip().replace("\n", ";;;\n")
+    check(read_one(write(tmp_path, f"{header}\n{rows}\n")))
+
+
+@pytest.mark.parametrize(
+    "other", ["Strain rate", "Stress rate (MPa/s)", "Stress standard deviation (MPa)", "Strain energy", "Stress error"]
+)
+def test_what_is_about_a_stress_or_strain_is_none(tmp_path, other):
+    check(read_one(write(tmp_path, table(f"{other};Strain;Stress (MPa)", 2 * STRESS, STRETCH - 1, STRESS, sep=";"))))
+
+
+def test_columns_that_are_not_needed_may_be_alike(tmp_path):
+    columns = (STRETCH, STRETCH, STRETCH - 1, STRESS, STRESS * STRETCH)
+    header = "Extension (mm);Position (mm);Strain;Engineering stress (MPa);True stress (MPa)"
+    check(read_one(write(tmp_path, table(header, *columns, sep=";"))))
+
+
 def test_units_in_a_row_of_their_own(tmp_path):
     text = table("Time,Tensile strain,Tensile stress\n(s),(%),(MPa)", STRETCH, 100 * (STRETCH - 1), STRESS)
     check(read_one(write(tmp_path, text)))
@@ -116,6 +142,24 @@ def test_simple_shear_and_volumetric(tmp_path):
     np.testing.assert_allclose(volumetric.stress, -1000 * (1 - J), atol=1e-6)
 
 
+def test_true_stress_of_simple_shear_is_the_nominal_one(tmp_path):
+    gamma = np.linspace(0.1, 1, 11)
+    for header, columns in (
+        ("shear strain,true stress (MPa)", (gamma, 0.1 * gamma)),
+        ("shear strain,nominal stress (MPa),true stress (MPa)", (gamma, 0.1 * gamma, 0.1 * gamma)),
+    ):
+        shear = read_one(write(tmp_path, table(header, *columns)))
+        np.testing.assert_allclose(shear.stress, 0.1 * gamma, rtol=1e-7)
+
+
+def test_a_mode_that_contradicts_the_file_is_refused(tmp_path):
+    rows = "".join(f"pure shear,0.{i},0.{i}\n" for i in range(1, 8))
+    file = write(tmp_path, f"mode,strain,stress (MPa)\n{rows}")
+    assert read_one(file, mode="planar").mode == "planar"
+    with pytest.raises(InputError, match=r"mode: .*'pure shear' \(found 'uniaxial'\); expected 'planar'"):
+        read_one(file, mode="uniaxial")
+
+
 def test_lateral_strain(tmp_path):
     text = table("strain,lateral strain,stress (MPa)", STRETCH - 1, STRETCH**-0.4 - 1, STRESS)
     np.testing.assert_allclose(read_one(write(tmp_path, text)).lateral, STRETCH**-0.4, rtol=1e-6)
@@ -126,6 +170,10 @@ def test_compression(tmp_path):
     test = read_one(write(tmp_path, table("strain,stress (MPa)", x - 1, 0.2 * (x - x**-2))))
     assert test.stretch[0] == pytest.approx(0.5)
     assert len(test.stretch) == 15
+    lines = [f"compression,{a - 1:.9g},{0.2 * (a - a**-2):.9g}" for a in x]
+    # noise about zero is no tension
+    named = read_one(write(tmp_path, "\n".join(["mode,strain,stress (MPa)", "compression,0.0001,0.00001", *lines])))
+    assert named.stretch.min() == pytest.approx(0.5)
 
 
 def dropped(test) -> dict[str, int]:
@@ -227,11 +275,19 @@ def test_toe_is_reported_and_removed(tmp_path):
     assert not any("meets zero stress" in warning for warning in clean.warnings)
 
 
+def test_points_at_one_strain_have_no_toe(recwarn):
+    strain = np.array([0.1] * 5 + [0.5, 0.9])
+    assert MaterialTest("uniaxial", 1.0 + strain, np.arange(1.0, 8.0)).toe == 0.0
+    assert not recwarn.list
+
+
 def test_database_curve_has_a_toe(shared_data):
     assert 0.01 < read_one(shared_data / "tensile" / "Dragon Skin 10 MEDIUM.csv").toe < 0.04
 
 
 GOOD = table("strain,stress (MPa)", STRETCH - 1, STRESS)
+
+GERMAN = "strain;stress (MPa);stress 2 (MPa)\n" + "".join(f"0,{i};0,0{i};0,{i}\n" for i in range(1, 9))
 
 MALFORMED = {
     "empty": ("", ["empty"]),
@@ -259,6 +315,33 @@ MALFORMED = {
     "contradicting stresses": (
         table("strain,engineering stress (MPa),true stress (MPa)", STRETCH - 1, STRESS, STRESS),
         ["contradict", "true stress", "row 22"],
+    ),
+    "decimal commas between commas": (
+        table("strain,stress (MPa)", STRETCH - 0.5, STRESS + 0.5, comma=True),
+        ["row 2", "4 cells under 2", "as many cells as the header", "';' or a tab"],
+    ),
+    "a cell beyond the header": (GOOD.replace("\n0.5,", "\n0.5,7,"), ["row 7", "3 cells under 2"]),
+    "specimens side by side": (
+        table("strain;stress (MPa);strain;stress (MPa)", STRETCH - 1, STRESS, STRETCH - 1, STRESS, sep=";"),
+        ["columns 1 and 3", "two columns hold the strain", "'strain' and 'strain'"],
+    ),
+    "two stresses": (GERMAN, ["columns 2 and 3", "'stress (MPa)' and 'stress 2 (MPa)'"]),
+    "one strain in all rows": (table("strain,stress (MPa)", np.full(21, 0.1), STRESS), ["'strain'", "the same", "0.1"]),
+    "compression that is a tension": (
+        "mode,strain,stress (MPa)\n" + "".join(f"compression,0.{i},0.{i}\n" for i in range(1, 8)),
+        ["row 8", "strain of this 'compression' is positive", "negative strains and stresses (or 'uniaxial'"],
+    ),
+    "compression that is pressed by a tension": (
+        "mode,strain,stress (MPa)\n" + "".join(f"compression,-0.{i},0.{i}\n" for i in range(1, 8)),
+        ["row 8", "stress of this 'compression' is positive"],
+    ),
+    "shear in percent without unit": (
+        "mode,strain,stress (MPa)\n" + "".join(f"simple shear,{i}0,0.{i}\n" for i in range(1, 8)),
+        ["looks like percent", "'strain'"],
+    ),
+    "thousands or decimals": (
+        "strain (%);stress (Pa)\n" + "".join(f"{i}0;{i},883\n" for i in range(1, 8)),
+        ["row 2", "'stress (Pa)'", "thousands or decimals", "1883 or 1.883"],
     ),
 }
 

@@ -165,7 +165,12 @@ def test_only_the_coordinates_that_were_measured_count(tmp_path: Path) -> None:
         (("marker,", "number,"), "there is no column 'marker'"),
         (("0.4,3,", "0.4,2,"), "this marker is not one more"),
         (("0.4,3,", "0.5,3,"), "marker 3 is missing at 40 kPa"),
-        (("0.4,3,", "0.4,3,oops,"), "this cell is not a number"),
+        (("0.4,3,", "0.4,3,oops"), "this cell is not a number"),
+        (("0.4,3,", "0.4,3,7,"), "row 7: this row has more cells than the header"),
+        (("0.4,3,", "0.4,3e9,"), r"row 7, column 'marker': this is not the number of a marker \(found '3e9'\)"),
+        (("0.4,3,", "0.4,2.5,"), r"row 7, column 'marker': .*found '2.5'"),
+        (("0.0,1,", "0.0,0,"), r"row 2, column 'marker': .*found '0'.*from 1 to that of the rows, 6"),
+        (("y (cm)", "x (cm)"), r"columns 3 and 4: two columns hold the x"),
     ],
 )
 def test_a_table_that_is_not_well_formed_is_refused(tmp_path: Path, change: tuple[str, str], words: str) -> None:

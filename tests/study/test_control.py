@@ -12,6 +12,7 @@ import pytest
 from samples import neo_hookean
 
 import turgor as tg
+from turgor.common.errors import InputError
 from turgor.fem.cavity import Cavity
 from turgor.fem.loads import Gravity, Pressure
 from turgor.fem.supports import Clamped, Sliding
@@ -118,6 +119,22 @@ def test_a_programme_goes_up_and_down(small_tube: Path) -> None:
     again = load_case(done.folder / "case.yaml")
     assert again.pressures[0].programme == load_case(done.folder / "case.yaml").pressures[0].programme
     assert again.duration == 4.0
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("time (s),pressure (kPa)\n0,0,0,0\n1,5,2,5\n", r"row 2: this row has more cells .*a decimal comma needs ';'"),
+        ("time (s);pressure (kPa);pressure (kPa)\n0;0;0\n1;2;3\n", "columns 2 and 3: two columns hold the pressure"),
+        ("time (s);time (ms);pressure (kPa)\n0;0;0\n1;2;3\n", r"'time \(s\)' and 'time \(ms\)'"),
+        ("time (s);pressure (Pa)\n0;0\n1;2,500\n", "thousands or decimals.*expected 2500 or 2.500"),
+        ("time (s);volume (ml)\n0;0\n1;2\n", r"expected a header such as 'time \(s\),cavity \(kPa\)'"),
+    ],
+)
+def test_a_programme_that_can_be_read_in_two_ways_is_refused(small_tube: Path, table: str, words: str) -> None:
+    small_tube.with_name("pressures.csv").write_text(table, encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        load_case(small_tube, ["loads=[{type: pressure, programme: {file: pressures.csv}}]"])
 
 
 def test_under_weight_the_volumes_lead_away_from_where_it_has_settled():

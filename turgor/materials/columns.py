@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from turgor.common.errors import InputError
 from turgor.common.units import INTERNAL_UNITS, to_internal
@@ -45,6 +46,10 @@ _WORDS: tuple[tuple[str, str], ...] = (
 
 _TRUE = re.compile(r"\b(true|cauchy|hencky|logarithmic|log)\b")
 _NOMINAL = re.compile(r"\b(engineering|eng|nominal|technical|pk1|p11|piola)\b")
+_ABOUT = re.compile(
+    r"\b(rate|energy|error|deviation|dev|std|stdev|sd|uncertainty|variance|fehler|abweichung|standardabweichung)\b"
+)
+"""Words that make something else of a stress or strain: its rate, its scatter, its energy."""
 _BRACKETS = re.compile(r"[\[({<]\s*([^\[\](){}<>]*(?:\([^()]*\))?[^\[\](){}<>]*)\s*[\])}>]\s*$")
 _UNIT_SUFFIX = re.compile(
     r"(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_]+)"
@@ -115,7 +120,7 @@ def understand(header: Sequence[str]) -> list[Column]:
         name, unit = header_unit(label)
         words = re.sub(r"[\s_\-.:]+", " ", name).strip().lower()
         quantity = next((q for q, pattern in _WORDS if re.fullmatch(pattern, words)), None)
-        if quantity is None:
+        if quantity is None or _ABOUT.search(words):
             continue
         measure = "true" if _TRUE.search(words) else "engineering" if _NOMINAL.search(words) else ""
         columns.append(Column(index, label.strip(), quantity, measure, unit))
@@ -141,8 +146,43 @@ def lacks(cells: Sequence[str]) -> str | None:
 
 
 def find(columns: Sequence[Column], quantity: str, measure: str | None = None) -> Column | None:
-    """Return the first column of a quantity (and measure), or ``None``."""
-    return next((c for c in columns if c.quantity == quantity and measure in (None, c.measure)), None)
+    """Return the first column of a quantity (and measure), or ``None``.
+
+    Raises
+    ------
+    InputError
+        If another column has the same quantity and the same measure.
+    """
+    found = matching(columns, quantity, measure)
+    if not found:
+        return None
+    alike = [column for column in found if column.measure == found[0].measure]
+    refuse_twins([(column.index, column.label) for column in alike], quantity)
+    return found[0]
+
+
+def matching(columns: Sequence[Column], quantity: str, measure: str | None = None) -> list[Column]:
+    """Return all columns of a quantity (and measure)."""
+    return [column for column in columns if column.quantity == quantity and measure in (None, column.measure)]
+
+
+def refuse_twins(alike: Sequence[tuple[int, str]], what: str, file: Path | None = None) -> None:
+    """Refuse more than one of the columns, given by place and label, that are understood `alike`.
+
+    Raises
+    ------
+    InputError
+        Naming the first two; nothing says which of them is meant.
+    """
+    if len(alike) > 1:
+        (i, first), (j, second) = alike[:2]
+        raise InputError(
+            f"two columns hold the {what}",
+            file=file,
+            key=f"columns {i + 1} and {j + 1}",
+            value=f"'{first}' and '{second}'",
+            expected="one of the two (remove or rename the other)",
+        )
 
 
 def header_unit(label: str) -> tuple[str, str | None]:

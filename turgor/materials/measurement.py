@@ -123,8 +123,11 @@ class MaterialTest:
         first = self.deformation <= self.deformation.min() + TOE_SPAN
         if np.count_nonzero(first) < MINIMUM_POINTS:
             return 0.0
-        slope, intercept = np.polyfit(self.deformation[first], self.stress[first], 1)
-        return float(-intercept / slope) if slope > 0 else 0.0
+        strain, stress = self.deformation[first], self.stress[first]
+        middle = strain - strain.mean()
+        # Points at one strain have no slope; a line through them would be one of rounding errors.
+        slope = middle @ stress / (middle @ middle) if np.ptp(strain) > 0 else 0.0
+        return float(strain.mean() - stress.mean() / slope) if slope > 0 else 0.0
 
     def with_toe_removed(self) -> MaterialTest:
         """Return the test with its strain counted from the end of the toe, the gauge being longer by as much."""

@@ -13,8 +13,9 @@ from turgor.common.errors import InputError
 
 DELIMITERS = (";", "\t", ",")
 
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-_EXPECTED_HEADER = (
+EXPECTED_HEADER = (
     "a row such as 'Engineering Strain;Engineering Stress (MPa)' above the numbers, its cells separated by ';', ',' "
     "or a tab"
 )
@@ -122,7 +123,8 @@ def read_table(
     Raises
     ------
     InputError
-        If the file cannot be read, no header is recognised, or no rows stand under it.
+        If the file cannot be read, no header is recognised, no rows stand under it, a row has more cells than the
+        header, or what its commas and points mean is open.
     """
     file = Path(path)
     lines = read_lines(file)
@@ -137,13 +139,13 @@ def read_table(
         for n, line in numbered:
             lacking = lacks(_split(line, delimiter))
             if lacking:
-                raise InputError(lacking, file=file, key=f"row {n}", value=line.strip(), expected=_EXPECTED_HEADER)
+                raise InputError(lacking, file=file, key=f"row {n}", value=line.strip(), expected=EXPECTED_HEADER)
     raise InputError(
         "no header with a strain and a stress (or a displacement and a force) was found",
         file=file,
         key=f"row {numbered[0][0]}" if numbered else None,
         value=numbered[0][1].strip() if numbered else None,
-        expected=_EXPECTED_HEADER,
+        expected=EXPECTED_HEADER,
     )
 
 
@@ -158,6 +160,7 @@ def _split(line: str, delimiter: str) -> tuple[str, ...]:
 def _below(file: Path, rows: list[Row], position: int, comments: tuple[str, ...], delimiter: str) -> Table:
     header = rows[position].cells
     body = [row for row in rows[position + 1 :] if any(row.cells)]
+    _refuse_surplus(file, header, body)
     if body and _is_unit_row(body[0].cells, header):
         header = tuple(
             f"{name} {unit}" if unit.startswith(("(", "[")) else f"{name} ({unit})" if unit else name
@@ -175,8 +178,41 @@ def _below(file: Path, rows: list[Row], position: int, comments: tuple[str, ...]
             file=file,
             expected="one of the two (and no separators of thousands)",
         )
+    if comma and delimiter != ",":
+        _refuse_thousands(file, header, body)
     metadata = {row.cells[0]: row.cells[1] for row in rows[:position] if len(row.cells) > 1 and row.cells[0]}
     return Table(file, header, tuple(body), metadata, comments, delimiter, comma)
+
+
+def _refuse_surplus(file: Path, header: Sequence[str], body: Sequence[Row]) -> None:
+    """Refuse a row with a cell beyond the header: its numbers would be read under the wrong names."""
+    for row in body:
+        if any(row.cells[len(header) :]):
+            raise InputError(
+                "this row has more cells than the header",
+                file=file,
+                key=f"row {row.number}",
+                value=f"{len(row.cells)} cells under {len(header)}",
+                expected="as many cells as the header (a decimal comma needs ';' or a tab between cells)",
+            )
+
+
+def _refuse_thousands(file: Path, header: Sequence[str], body: Sequence[Row]) -> None:
+    """Refuse commas that may separate thousands as well as decimals.
+
+    One comma that cannot stand behind thousands, as in 0,125 or 1,5, shows that all of the file are decimal.
+    """
+    places = [(row, i, cell) for row in body for i, cell in enumerate(row.cells) if "," in cell]
+    places = [(row, i, cell) for row, i, cell in places if _NUMBER.fullmatch(cell)]
+    if all(_THOUSANDS.fullmatch(cell) for _, _, cell in places):
+        row, i, cell = places[0]
+        raise InputError(
+            "this comma may separate thousands or decimals, and so may every other in the file",
+            file=file,
+            key=f"row {row.number}, column '{header[i]}'",
+            value=cell,
+            expected=f"{cell.replace(',', '')} or {cell.replace(',', '.')}",
+        )
 
 
 def _is_unit_row(cells: Sequence[str], header: Sequence[str]) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
 from turgor.materials.cleaning import Curve, clean
-from turgor.materials.columns import Column, find, header_unit, is_header, lacks, understand
+from turgor.materials.columns import Column, find, header_unit, is_header, lacks, matching, understand
 from turgor.materials.kinematics import Array
 from turgor.materials.measurement import CROSSHEAD_WARNING, MINIMUM_POINTS, MODES, TOE_LIMIT, MaterialTest, Specimen
 from turgor.materials.tabular import Table, read_table
@@ -42,21 +42,23 @@ def read_tests(path: str | Path, specimen: Specimen | None = None) -> tuple[Mate
     table = read_table(path, is_header, lacks)
     known = specimen or Specimen()
     columns = understand(table.header)
-    return tuple(
-        _Reading(table, columns, known, mode, name, rows).test() for mode, name, rows in _groups(table, columns)
-    )
+    try:
+        return tuple(
+            _Reading(table, columns, known, word, name, rows).test() for word, name, rows in _groups(table, columns)
+        )
+    except InputError as error:
+        raise error.at(file=table.file) from error
 
 
-def _groups(table: Table, columns: Sequence[Column]) -> list[tuple[str | None, str, list[int]]]:
-    """Split the rows by their mode and specimen, in the order in which these appear."""
+def _groups(table: Table, columns: Sequence[Column]) -> list[tuple[str, str, list[int]]]:
+    """Split the rows by the word for their mode and by specimen, in the order in which these appear."""
     mode_column, specimen_column = find(columns, "mode"), find(columns, "specimen")
     modes = table.text(mode_column.index) if mode_column else [""] * len(table.rows)
     names = table.text(specimen_column.index) if specimen_column else [""] * len(table.rows)
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(zip(modes, names, strict=True)):
         groups.setdefault(key, []).append(i)
-    file = str(table.file)
-    return [(_mode(mode, file), name, rows) for (mode, name), rows in groups.items()]
+    return [(word, name, rows) for (word, name), rows in groups.items()]
 
 
 _MODE_WORDS = {
@@ -66,9 +68,10 @@ _MODE_WORDS = {
     "simple-shear": r"simple.?shear|shear|ss",
     "volumetric": r"volum.*|hydrostatic.*|vol",
 }
+_COMPRESSION = r"compression|compressive.*|uc"
 
 
-def _mode(word: str, file: str) -> str | None:
+def _mode_of_word(word: str, file: str) -> str | None:
     if not word:
         return None
     for mode, pattern in _MODE_WORDS.items():
@@ -81,7 +84,7 @@ class _Reading:
     """One mode and specimen of a table on its way to a :class:`MaterialTest`."""
 
     def __init__(
-        self, table: Table, columns: Sequence[Column], known: Specimen, mode: str | None, name: str, chosen: list[int]
+        self, table: Table, columns: Sequence[Column], known: Specimen, word: str, name: str, chosen: list[int]
     ) -> None:
         self.table, self.columns, self.known = table, columns, known
         self.name, self.chosen = name, np.array(chosen)
@@ -89,7 +92,8 @@ class _Reading:
         self.used: list[str] = []
         self.assumed: list[str] = []
         self.warnings: list[str] = []
-        self.mode = known.mode or mode or self._mode_of_columns()
+        self.word = word
+        self.mode = self._mode()
 
     def test(self) -> MaterialTest:
         deformation = self._deformation()
@@ -97,6 +101,7 @@ class _Reading:
         lateral = self._lateral()
         rows = np.array([self.table.rows[i].number for i in self.chosen])
         self._check_deformation(deformation, rows)
+        self._check_compression(deformation, stress, rows)
         curve, dropped, changed = clean(Curve(rows, deformation, stress, lateral))
         if len(curve) < MINIMUM_POINTS:
             gone = "; ".join(f"{len(part.rows)} dropped ({part.reason})" for part in dropped)
@@ -105,6 +110,14 @@ class _Reading:
                 file=self.file,
                 key=self.name or None,
                 expected=f"at least {MINIMUM_POINTS} rows with a strain and a stress",
+            )
+        if not np.ptp(curve.deformation) > 0:
+            raise InputError(
+                "the strain is the same in all usable rows",
+                file=self.file,
+                key=f"column '{self.used[0]}'",
+                value=float(curve.deformation[0]),
+                expected="a strain that grows with the load",
             )
         shift = 0.0 if self.mode == "simple-shear" else 1.0
         source = self._strain_source()
@@ -130,6 +143,18 @@ class _Reading:
         )
         return replace(test, warnings=(*test.warnings, warning))
 
+    def _mode(self) -> str:
+        written = _mode_of_word(self.word, self.file)
+        if written and self.known.mode and self.known.mode != written:
+            raise InputError(
+                f"the file says that this test is '{self.word}'",
+                file=self.file,
+                key="mode",
+                value=self.known.mode,
+                expected=f"'{written}', or no mode beside that of the file",
+            )
+        return self.known.mode or written or self._mode_of_columns()
+
     def _mode_of_columns(self) -> str:
         quantities = {column.quantity for column in self.columns}
         if quantities & {"volume ratio", "volumetric strain"}:
@@ -150,7 +175,7 @@ class _Reading:
         if self.mode == "volumetric":
             return self._first({"volume ratio": lambda x: x - 1.0, "volumetric strain": lambda x: x})
         if self.mode == "simple-shear" and (column := find(self.columns, "shear") or find(self.columns, "strain")):
-            return self._values(column)
+            return self._bare_checked(column)
         if column := find(self.columns, "stretch"):
             return self._values(column) - 1.0
         engineering = find(self.columns, "strain", "engineering") or find(self.columns, "strain", "")
@@ -211,9 +236,11 @@ class _Reading:
             return self._values(column)
         engineering = find(self.columns, "stress", "engineering")
         true = find(self.columns, "stress", "true")
-        bare = find(self.columns, "stress", "")
-        if engineering is None and bare is not None:
-            strain_is_true = find(self.columns, "strain", "true") and not find(self.columns, "strain", "engineering")
+        bare = None if engineering else find(self.columns, "stress", "")
+        if bare is not None:
+            strain_is_true = matching(self.columns, "strain", "true") and not matching(
+                self.columns, "strain", "engineering"
+            )
             if strain_is_true and true is None:
                 true = bare
                 self.assumed.append(f"'{bare.label}' is true stress, as the strain beside it is true")
@@ -223,13 +250,18 @@ class _Reading:
         if engineering:
             stress = self._values(engineering)
             if true:
-                self._check_pair(true, stress * (1.0 + deformation), "stress")
+                self._check_pair(true, stress * self._area_ratio(deformation), "stress")
             return stress
         if true:
             # Incompressible: the area shrinks by 1/λ, so that P = σ/λ in every mode of tension.
-            self.assumed.append("the volume is constant (true stress turned into nominal)")
-            return self._values(true) / (1.0 + deformation)
+            if self.mode != "simple-shear":
+                self.assumed.append("the volume is constant (true stress turned into nominal)")
+            return self._values(true) / self._area_ratio(deformation)
         return self._stress_from_force()
+
+    def _area_ratio(self, deformation: Array) -> Array:
+        """How often the loaded area goes into the undeformed one: λ, and one in simple shear, whose plane stays."""
+        return np.ones_like(deformation) if self.mode == "simple-shear" else 1.0 + deformation
 
     def _stress_from_force(self) -> Array:
         column = find(self.columns, "force")
@@ -278,6 +310,21 @@ class _Reading:
                 expected="engineering strain above -1, compression negative",
             )
 
+    def _check_compression(self, deformation: Array, stress: Array, rows: Array) -> None:
+        """Refuse a compression whose numbers are those of a tension; noise about zero has a right to be positive."""
+        if not re.fullmatch(_COMPRESSION, self.word.lower()):
+            return
+        for quantity, values in (("strain", deformation), ("stress", stress)):
+            if np.nanmax(values, initial=0.0) > -np.nanmin(values, initial=0.0):
+                worst = int(np.nanargmax(values))
+                raise InputError(
+                    f"the {quantity} of this '{self.word}' is positive",
+                    file=self.file,
+                    key=f"row {rows[worst]}",
+                    value=float(values[worst]),
+                    expected="negative strains and stresses (or 'uniaxial' as the kind of test, if it is a tension)",
+                )
+
     def _check_pair(self, true: Column, expected: Array, quantity: str) -> None:
         """Refuse true values that contradict the engineering ones."""
         difference = np.abs(self._values(true) - expected)
@@ -296,7 +343,7 @@ class _Reading:
     def _strain_source(self) -> str:
         source = self.known.strain_source or self._stated_source()
         if source is None:
-            if find(self.columns, "displacement") and not find(self.columns, "strain"):
+            if matching(self.columns, "displacement") and not matching(self.columns, "strain"):
                 source = "crosshead"
                 self.assumed.append("the displacement is the crosshead's (the file does not say)")
             else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
-from turgor.materials.columns import header_unit
+from turgor.materials.columns import header_unit, refuse_twins
 from turgor.materials.tabular import Table, read_table
 
 FloatArray = npt.NDArray[np.float64]
@@ -58,11 +58,13 @@ def read_positions(file: Path) -> MeasuredPositions:
     Raises
     ------
     InputError
-        If the file cannot be read, a column or unit is missing, a cell is no number, or a marker is missing or twice
-        at a pressure.
+        If the file cannot be read, a column or unit is missing, two columns have one name, a cell is no number, a
+        marker is none of the numbers from 1 to that of the rows, or one is missing or twice at a pressure.
     """
     table = read_table(file, _is_header, _lacks)
     columns = _columns(table.header)
+    for name in columns:
+        refuse_twins([(i, table.header[i]) for i, n in enumerate(_names(table.header)) if n == name], name, file)
     factors = {name: _factor(table, place, name) for name, place in columns.items() if name != "marker"}
     numbers = {name: np.array(table.numbers(place)) * factors.get(name, 1.0) for name, place in columns.items()}
     for name, values in numbers.items():
@@ -71,18 +73,10 @@ def read_positions(file: Path) -> MeasuredPositions:
             raise InputError("a cell is empty", file=file, key=f"row {row}, column '{table.header[columns[name]]}'")
     pressures = np.unique(numbers["pressure"])
     markers = numbers["marker"]
-    count = int(markers.max())
-    places = np.full((len(pressures), count, 3), math.nan)
+    _check_markers(table, columns["marker"], markers)
     at = np.searchsorted(pressures, numbers["pressure"])
-    for place, step, marker in zip(table.rows, at, markers, strict=True):
-        if marker != int(marker) or marker < 1 or not np.isnan(places[step, int(marker) - 1, 0]):
-            expected = "whole numbers from 1, each once at a pressure"
-            raise InputError("this marker is not one more", file=file, key=f"row {place.number}", expected=expected)
-        places[step, int(marker) - 1] = 0.0
-    if np.isnan(places).any():
-        step, marker, _ = np.argwhere(np.isnan(places))[0]
-        problem = f"marker {marker + 1} is missing at {pressures[step] * 1000.0:.4g} kPa"
-        raise InputError(problem, file=file, expected=f"{count} markers at each pressure")
+    _check_complete(table, at, markers, pressures)
+    places = np.zeros((len(pressures), int(markers.max()), 3))
     for axis, name in enumerate(_AXES):
         if name in numbers:
             places[at, markers.astype(int) - 1, axis] = numbers[name]
@@ -91,8 +85,41 @@ def read_positions(file: Path) -> MeasuredPositions:
 
 def _columns(cells: Sequence[str]) -> dict[str, int]:
     """Return the place of each column that is known by its name."""
-    names = [header_unit(cell)[0].strip().lower() for cell in cells]
+    names = _names(cells)
     return {name: names.index(name) for name in ("pressure", "marker", *_AXES) if name in names}
+
+
+def _names(cells: Sequence[str]) -> list[str]:
+    return [header_unit(cell)[0].strip().lower() for cell in cells]
+
+
+def _check_markers(table: Table, place: int, markers: FloatArray) -> None:
+    """Refuse what is no marker's number: places are kept for as many markers as the largest of them says."""
+    wrong = (markers != np.floor(markers)) | (markers < 1) | (markers > len(markers))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(
+            "this is not the number of a marker",
+            file=table.file,
+            key=f"row {table.rows[row].number}, column '{table.header[place]}'",
+            value=table.text(place)[row],
+            expected=f"a whole number from 1 to that of the rows, {len(markers)}",
+        )
+
+
+def _check_complete(table: Table, at: npt.NDArray[np.intp], markers: FloatArray, pressures: FloatArray) -> None:
+    """Refuse a marker that stands twice at a pressure or not at all; `at` is the row's place among the pressures."""
+    count, seen = int(markers.max()), set()
+    for row, pair in zip(table.rows, zip(at.tolist(), markers.tolist(), strict=True), strict=True):
+        if pair in seen:
+            expected = "whole numbers from 1, each once at a pressure"
+            raise InputError("this marker is not one more", file=table.file, key=f"row {row.number}", expected=expected)
+        seen.add(pair)
+    every = itertools.product(range(len(pressures)), range(1, count + 1))
+    missing = next((pair for pair in every if pair not in seen), None)
+    if missing:
+        problem = f"marker {missing[1]} is missing at {pressures[missing[0]] * 1000.0:.4g} kPa"
+        raise InputError(problem, file=table.file, expected=f"{count} markers at each pressure")
 
 
 def _is_header(cells: Sequence[str]) -> bool:

@@ -15,8 +15,8 @@ from pydantic_core import CoreSchema
 from turgor.common.errors import InputError
 from turgor.common.units import INTERNAL_UNITS, Pressure, Time, to_internal, to_text
 from turgor.fem.programme import Programme
-from turgor.materials.columns import header_unit
-from turgor.materials.tabular import Table, read_table
+from turgor.materials.columns import header_unit, refuse_twins
+from turgor.materials.tabular import EXPECTED_HEADER, Table, read_table
 from turgor.study.materials import in_case_folder
 from turgor.study.validation import StrictModel, invalid
 
@@ -100,12 +100,18 @@ def _read(path: Path, wanted: Sequence[str]) -> dict[str, Any]:
     try:
         table = read_table(path, fits, lacking)
     except InputError as error:
-        expected = f"a header such as 'time (s),{wanted[0]} (kPa)' above the numbers"
+        header = f"a header such as 'time (s),{wanted[0]} (kPa)' above the numbers"
+        expected = header if error.expected in (None, EXPECTED_HEADER) else error.expected
         problem = error.problem if "strain" not in error.problem else "no header with a time and a pressure was found"
         raise InputError(problem, file=error.file, key=error.key, value=error.value, expected=expected) from None
     names = _names(table.header)
-    pressure = next(names.index(name.lower()) for name in wanted if name.lower() in names)
-    return {"time": _column(table, names.index("time"), "time"), "pressure": _column(table, pressure, "pressure")}
+    pressure = next(name.lower() for name in wanted if name.lower() in names)
+    for known in ("time", pressure):
+        refuse_twins([(i, table.header[i]) for i, name in enumerate(names) if name == known], known, path)
+    return {
+        "time": _column(table, names.index("time"), "time"),
+        "pressure": _column(table, names.index(pressure), "pressure"),
+    }
 
 
 def _names(header: Sequence[str]) -> list[str]:
