@@ -9,6 +9,8 @@ import pytest
 from results.hollow_finger import LENGTH, WIDTH, hollow_finger, moved, rod
 
 from turgor.common.errors import InputError
+from turgor.geometry.tube import CappedTube
+from turgor.mesh.generate import generate
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, rectangle
 from turgor.results.material_line import section_centroids
@@ -88,6 +90,58 @@ def test_a_straight_body_has_no_coil_and_no_torsion() -> None:
     line = measured(FINGER, stretched, "centreline")
     assert line[:, TORSION] == pytest.approx(0.0)
     assert line[:, X] == pytest.approx(np.linspace(0.0, 1.2 * LENGTH, 20), abs=1e-3)
+
+
+def tube(model: str) -> Mesh:
+    """A straight tube along z, 60 mm long, of tetrahedra whose nodes lie nowhere in particular."""
+    shape = CappedTube(inner_radius="3 mm", wall="2 mm", length="60 mm", cap="3 mm", model=model)
+    return generate(shape, 4.0)
+
+
+@pytest.mark.parametrize("model", ["full", "half", "quarter"])
+@pytest.mark.parametrize("by", ["sections", "opposite"])
+def test_the_line_through_a_straight_tube_is_its_axis_to_both_ends(model: str, by: str) -> None:
+    body = Body(tube(model))
+    line = measured(body, np.zeros_like(body.mesh.points), "centreline", by=by)
+    # A chord of the flat pieces of the outside, on which the opposite points lie, is off by their height.
+    assert line[:, X : Y + 1] == pytest.approx(0.0, abs=1e-3 if by == "sections" else 1e-2)
+    assert line[:, Z] == pytest.approx(np.linspace(0.0, 60.0, 20), abs=1e-3)
+    assert line[:, CURVATURE] == pytest.approx(0.0, abs=1e-4 if by == "sections" else 5e-3)
+    assert math.isnan(measured(body, np.zeros_like(body.mesh.points), "coil", by=by)[0])
+
+
+@pytest.mark.parametrize("model", ["full", "half"])
+def test_a_tube_bent_to_an_arc_has_one_curvature_to_both_ends(model: str) -> None:
+    body, angle = Body(tube(model)), math.radians(90.0)
+    x, y, z = body.mesh.points.T
+    radius = 60.0 / angle
+    arc = np.column_stack([radius - (radius - x) * np.cos(z / radius), y, (radius - x) * np.sin(z / radius)])
+    line = measured(body, arc - body.mesh.points, "centreline")
+    assert line[1:-1, CURVATURE] == pytest.approx(1.0 / radius, rel=2e-2)
+    assert line[[0, -1], CURVATURE] == pytest.approx(1.0 / radius, rel=5e-2)
+    assert line[:, Y] == pytest.approx(0.0, abs=1e-3)
+    assert line[-1, S] == pytest.approx(60.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [40.0, 120.0])
+def test_the_sections_of_a_body_that_is_curved_at_rest_are_whole(degrees: float) -> None:
+    straight, angle = FINGER.mesh, math.radians(degrees)
+    points = straight.points + rod(straight.points, angle)
+    body = Body(Mesh(points, straight.cells, surfaces=straight.surfaces))
+    radius = LENGTH / angle
+    line = measured(body, np.zeros_like(points), "centreline", stations=30)
+    away = np.linalg.norm(line[:, X : Z + 1] - [0.0, 0.0, radius], axis=1)
+    # A plane across the chord cuts the arc at an angle, the more the nearer to its ends.
+    assert away == pytest.approx(radius, abs=(0.02 if degrees < 90.0 else 0.06) * WIDTH)
+    assert line[:, Y] == pytest.approx(0.0, abs=1e-2)
+
+
+def test_end_faces_that_leave_no_room_for_a_section_are_refused() -> None:
+    solid = box((4.0, 8.0, 8.0), (2, 2, 2))
+    sheared = solid.points + np.outer(solid.points[:, 1], [1.0, 0.0, 0.0])
+    ends = {"mount": solid.surfaces["x0"], "tip-face": solid.surfaces["x1"]}
+    with pytest.raises(InputError, match=r"no plane across the axis clears both end faces.*marker"):
+        section_centroids(Mesh(sheared, solid.cells, surfaces=ends), 9)
 
 
 @pytest.mark.parametrize("kind", ["tet10", "hex27", "tri6", "quad9"])

@@ -67,8 +67,8 @@ def test_the_pneunet_bends_more_with_a_narrow_gap_whose_walls_meet(final: Final)
     wide, narrow = (
         final("pneunet", "geometry.chambers=3", f"geometry.gap={gap} mm", "mesh.size=4 mm") for gap in (2, 0.5)
     )
-    # 52.7° on 3 mm elements (benchmarks/studies/pneunet.py).
-    assert wide["bending_angle_deg"] == pytest.approx(52.7, rel=0.02)
+    # 52.3° on 3 mm elements (benchmarks/studies/pneunet.py).
+    assert wide["bending_angle_deg"] == pytest.approx(52.3, rel=0.02)
     assert narrow["contact_self_area_mm2"] > 1.0
     assert narrow["contact_self_overlap_per_wall"] < 0.01
     assert narrow["bending_angle_deg"] > 1.02 * wide["bending_angle_deg"]

@@ -42,8 +42,8 @@ def test_the_reinforced_tube_bends_towards_its_band_and_ever_faster(tmp_path: Pa
         "reinforced-tube", tmp_path, "0.25 bar", ["0.10 bar", "0.25 bar"], geometry=short, mesh={"size": "6 mm"}
     )
     turned = found["bending_angle_deg"]
-    # 20.46° with elements of 4 mm, 20.83° with 3 mm.
-    assert turned[-1] == pytest.approx(20.46, rel=0.03)
+    # 19.68° with elements of 4 mm, 20.09° with 3 mm.
+    assert turned[-1] == pytest.approx(19.68, rel=0.03)
     # The paper's chord turns by 28.79° over a cavity of 100 mm, the end face by twice as much; of the short tube the
     # caps, which bend a little too, are a larger part.
     assert 1.0 < turned[-1] / (2.0 * 28.79 * 30.0 / 100.0) < 1.25

@@ -15,14 +15,15 @@ from turgor.fem.locate import locate
 from turgor.mesh.cells import Cell
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
-from turgor.results.sections import CENTRELINE, MOUNT, TIP_FACE
+from turgor.results.sections import CENTRELINE
 from turgor.results.skin import six_node_triangles
+from turgor.results.symmetry import MOUNT, TIP_FACE, surface_middle, symmetry_of
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
 INSIDE = 1e-6
-"""The first and the last cross-section lie so far inside the body, in parts of its length."""
+"""The first and the last cross-section lie so far from the end faces, in parts of the body's length."""
 
 _SIMPLICES = {
     "tri6": [[0, 1, 2]],
@@ -47,10 +48,24 @@ _MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]]), np.ful
 
 
 def axis_stations(mesh: Mesh, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return places ``(count, d)`` at equal distances from the mount's middle to the tip face's, and the axis."""
-    start, end = (mesh.points[mesh.surface_nodes(name)].mean(axis=0) for name in (MOUNT, TIP_FACE))
-    share = np.linspace(INSIDE, 1.0 - INSIDE, count)[:, None]
-    return start + share * (end - start), (end - start) / np.linalg.norm(end - start)
+    """Return places ``(count, d)`` at equal distances from the mount's middle to the tip face's, and the axis.
+
+    A plane across the axis that met an end face would cut off a part of the section. So the first lies where it clears
+    the whole mount, the last where it clears the whole tip face, however these are tilted.
+
+    Raises
+    ------
+    InputError
+        If there is no room between the two.
+    """
+    start, end = (surface_middle(mesh, name) for name in (MOUNT, TIP_FACE))
+    length = float(np.linalg.norm(end - start))
+    axis = (end - start) / length
+    mount, tip = ((mesh.points[mesh.surface_nodes(name)] - start) @ axis for name in (MOUNT, TIP_FACE))
+    first, last = mount.max() + INSIDE * length, tip.min() - INSIDE * length
+    if first >= last:
+        raise InputError("no plane across the axis clears both end faces", key="by", expected="marker")
+    return start + np.linspace(first, last, count)[:, None] * axis, axis
 
 
 def at_points(mesh: Mesh, places: FloatArray) -> sp.csr_matrix:
@@ -73,7 +88,7 @@ def section_centroids(mesh: Mesh, count: int) -> sp.csr_matrix:
     """Return the shares ``(count, n)`` of the nodes in the centroids of cross-sections at equal distances.
 
     A cross-section is the material that lay, at rest, in a plane across the line from the mount to the tip face; its
-    centroid is the mean over its area at rest.
+    centroid is the mean over its area at rest. Of half a body it is that of the half.
 
     Raises
     ------
@@ -111,7 +126,8 @@ def along_marker(mesh: Mesh, count: int) -> sp.csr_matrix:
 def between_opposite(mesh: Mesh, count: int, across: FloatArray) -> sp.csr_matrix:
     """Return the shares ``(count, n)`` of the nodes in the means of two opposite points of the outside.
 
-    The two points of a station are where the line through it along `across` leaves the body on either side.
+    The two points of a station are where the line through it along `across` leaves the body, or an image of it, on
+    either side.
 
     Raises
     ------
@@ -136,22 +152,33 @@ _FLAT = {6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]), 3: np.array(
 
 
 def _ends_across(mesh: Mesh, pieces: IntArray, station: FloatArray, direction: FloatArray) -> FloatArray:
-    """Return the two outermost places ``(2, d)`` where a line meets flat pieces."""
+    """Return the two outermost places ``(2, d)`` where a line meets flat pieces or their images.
+
+    Where it meets images of the pieces, its own images meet the pieces: these places in the body are returned.
+    """
+    whole = symmetry_of(mesh)
+    starts, directions = whole.places(station[None]), whole.vectors(direction[None])
+    found = [_hits(mesh, pieces, *line) for line in zip(starts, directions, strict=True)]
+    image, distance = np.repeat(np.arange(len(found)), [len(hits) for hits in found]), np.concatenate(found)
+    if not len(distance) or np.ptp(distance) < 1e-6 * np.ptp(mesh.points, axis=0).max():
+        where = ", ".join(f"{x:.4g}" for x in station)
+        raise InputError(f"the line across the body through ({where}) mm leaves it on one side only", key="across")
+    ends = [np.argmin(distance), np.argmax(distance)]
+    return np.asarray(starts[image[ends]] + distance[ends, None] * directions[image[ends]])
+
+
+def _hits(mesh: Mesh, pieces: IntArray, start: FloatArray, direction: FloatArray) -> FloatArray:
+    """Return at which distances ``(k,)`` from `start` along `direction` a line meets flat pieces."""
     d = mesh.dimension
-    # Shares λ of a piece's corners and the distance t along the line: Σ λ_i X_i − t a = station, Σ λ_i = 1.
+    # Shares λ of a piece's corners and the distance t along the line: Σ λ_i X_i − t a = start, Σ λ_i = 1.
     system = np.ones((len(pieces), d + 1, d + 1))
     system[:, :d, :d] = mesh.points[pieces].swapaxes(1, 2)
     system[:, :d, d] = -direction
     system[:, d, d] = 0.0
     size = np.ptp(mesh.points[pieces], axis=1).max(axis=1)
     steep = np.abs(np.linalg.det(system)) > 1e-9 * size ** (d - 1)
-    found = np.linalg.solve(system[steep], np.append(station, 1.0)[:, None])[:, :, 0]
-    hit = (found[:, :d] >= -1e-9).all(axis=1)
-    distance = found[hit, d]
-    if not hit.any() or np.ptp(distance) < 1e-6 * np.ptp(mesh.points, axis=0).max():
-        where = ", ".join(f"{x:.4g}" for x in station)
-        raise InputError(f"the line across the body through ({where}) mm leaves it on one side only", key="across")
-    return np.asarray(station + np.array([[distance.min()], [distance.max()]]) * direction)
+    found = np.linalg.solve(system[steep], np.append(start, 1.0)[:, None])[:, :, 0]
+    return np.asarray(found[(found[:, :d] >= -1e-9).all(axis=1), d])
 
 
 def _cut(mesh: Mesh, height: FloatArray, simplices: npt.NDArray[np.integer]) -> sp.csr_matrix | None:
@@ -195,17 +222,16 @@ def _corners_of_piece(
 def _mean_shares(mesh: Mesh, kind: Cell, cells: npt.NDArray[np.integer], local: FloatArray) -> FloatArray:
     """Return the integrals of the shape functions over pieces of a section, ``(k, n_nodes)``, mm² (mm)."""
     rule, weights = _SIMPSON if kind.dimension == 2 else _MIDDLES
-    shape = kind.shape((rule @ local).reshape(-1, kind.dimension)).reshape(len(cells), len(rule), -1)
-    ends = np.einsum(
-        "kcn,kni->kci",
-        kind.shape(local.reshape(-1, kind.dimension)).reshape(*local.shape[:2], -1),
-        mesh.points[mesh.cells[cells]],
-    )
-    sides = ends[:, 1:] - ends[:, :1]
-    size = np.linalg.norm(sides[:, 0], axis=1)
+    places = (rule @ local).reshape(-1, kind.dimension)
+    shape = kind.shape(places).reshape(len(cells), len(rule), -1)
+    gradient = kind.gradient(places).reshape(*shape.shape, kind.dimension)
+    # A piece with a side on a curved face is curved itself.
+    sides = local[:, 1:] - local[:, :1]
+    tangents = np.einsum("kni,kqnj,ksj->sqki", mesh.points[mesh.cells[cells]], gradient, sides, optimize=True)
+    sizes = np.linalg.norm(tangents[0], axis=-1)
     if kind.dimension == 3:
-        size = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return np.asarray(size[:, None] * np.einsum("q,kqn->kn", weights, shape))
+        sizes = 0.5 * np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
+    return np.asarray(np.einsum("q,qk,kqn->kn", weights, sizes, shape))
 
 
 def _shares(

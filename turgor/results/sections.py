@@ -3,12 +3,13 @@
 A body is sliced between its surfaces ``mount`` and ``tip-face``, along the marker ``centreline`` where it has one, else
 along the straight line between the two faces. Each slice gets the rotation that fits its displacement best (Kabsch,
 1976, *Acta Cryst.* A32, 922), so that bulging walls do not count. Between neighbours the rotation is small, and adding
-up these small rotations tells 311° from −49°.
+up these small rotations tells 311° from −49°. Of half a body the slices are those of the whole.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,10 +19,11 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from turgor.mesh.mesh import Mesh, in_space
+from turgor.results.symmetry import MOUNT, TIP_FACE, surface_middle, symmetry_of
 
 FloatArray = npt.NDArray[np.float64]
 
-MOUNT, TIP_FACE, CENTRELINE = "mount", "tip-face", "centreline"
+CENTRELINE = "centreline"
 
 OUT_OF_PLANE = np.sin(np.radians(30.0))
 """Sine of the angle by which axes may leave a plane in which the body is said to bend."""
@@ -91,7 +93,7 @@ def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
 def seen_from_mount(mesh: Mesh, displacement: FloatArray, vector: FloatArray) -> FloatArray:
     """Return `vector` ``(3,)`` as it looks to someone who turns with the mount."""
     nodes = mesh.surface_nodes(MOUNT)
-    rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
+    rotation = _rotation_of_whole(mesh, displacement, nodes)
     assert rotation is not None, "in space a surface never lies on a line"
     return np.asarray(rotation.T @ vector)
 
@@ -114,15 +116,24 @@ def _unwrapped_angle(carried: FloatArray, accumulated: FloatArray) -> float:
 
 def _fitted_slices(mesh: Mesh, displacement: FloatArray) -> tuple[Rotation, FloatArray, FloatArray]:
     """Rotation of each slice and its centre before and after, ``(k, 3)``, from the mount to the tip face."""
-    groups: list[npt.NDArray[Any]] = [mesh.surface_nodes(MOUNT), *_slices(mesh), mesh.surface_nodes(TIP_FACE)]
     rotations, before, after = [], [], []
-    for nodes in groups:
-        rotation = _best_rotation(mesh.points[nodes], displacement[nodes])
+    for nodes, at_rest, now in _groups(mesh, displacement):
+        rotation = _rotation_of_whole(mesh, displacement, nodes)
         if rotation is not None:
             rotations.append(rotation)
-            before.append(in_space(mesh.points[nodes].mean(axis=0)))
-            after.append(before[-1] + in_space(displacement[nodes].mean(axis=0)))
+            before.append(in_space(at_rest))
+            after.append(in_space(now))
     return Rotation.from_matrix(np.array(rotations)), np.array(before), np.array(after)
+
+
+def _groups(mesh: Mesh, displacement: FloatArray) -> Iterator[tuple[npt.NDArray[Any], FloatArray, FloatArray]]:
+    """Yield the nodes of the mount, of each slice and of the tip face, with the centre ``(d,)`` before and after."""
+    whole, places = symmetry_of(mesh), mesh.points + displacement
+    yield mesh.surface_nodes(MOUNT), surface_middle(mesh, MOUNT), surface_middle(mesh, MOUNT, displacement)
+    for nodes in _slices(mesh):
+        if len(nodes):
+            yield nodes, whole.middle(mesh.points[nodes].mean(axis=0)), whole.middle(places[nodes].mean(axis=0))
+    yield mesh.surface_nodes(TIP_FACE), surface_middle(mesh, TIP_FACE), surface_middle(mesh, TIP_FACE, displacement)
 
 
 def _slices(mesh: Mesh) -> list[npt.NDArray[np.intp]]:
@@ -138,15 +149,20 @@ def _slices(mesh: Mesh) -> list[npt.NDArray[np.intp]]:
 def _reference_line(mesh: Mesh) -> FloatArray:
     if CENTRELINE in mesh.markers and len(mesh.marker(CENTRELINE)) > 1:
         return np.asarray(mesh.points[mesh.marker(CENTRELINE)])
-    ends = [mesh.points[mesh.surface_nodes(name)].mean(axis=0) for name in (MOUNT, TIP_FACE)]
-    return np.array(ends)
+    return np.array([surface_middle(mesh, name) for name in (MOUNT, TIP_FACE)])
 
 
 def _axis(mesh: Mesh) -> FloatArray:
     """Unit vector along the reference line where it reaches the tip face."""
     line = _reference_line(mesh)
-    direction = line[-1] - line[-2]
+    direction = symmetry_of(mesh).along(line[-1] - line[-2])
     return np.asarray(in_space(direction / np.linalg.norm(direction)))
+
+
+def _rotation_of_whole(mesh: Mesh, displacement: FloatArray, nodes: npt.NDArray[Any]) -> FloatArray | None:
+    """Best rotation ``(3, 3)`` of `nodes` ``(k,)`` together with their images; None where nothing fixes it."""
+    whole = symmetry_of(mesh)
+    return _best_rotation(whole.places(mesh.points[nodes]), whole.vectors(displacement[nodes]))
 
 
 def _best_rotation(points: FloatArray, displacement: FloatArray) -> FloatArray | None:

@@ -15,8 +15,8 @@ from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.material_line import along_marker, between_opposite, section_centroids
 from turgor.results.measures.registry import curve, measure
-from turgor.results.sections import MOUNT, TIP_FACE
 from turgor.results.stored import StoredState
+from turgor.results.symmetry import MOUNT, TIP_FACE, symmetry_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -72,7 +72,9 @@ def coil(
 
 def _line(state: StoredState, stations: int, by: By, across: Vector) -> FloatArray:
     """Return the places of the stations now, ``(stations, 3)``, mm."""
-    return in_space(np.asarray(_shares(state.mesh, stations, by, across) @ state.positions))
+    places = np.asarray(_shares(state.mesh, stations, by, across) @ state.positions)
+    # A marker is a line of its own; centroids and means of opposite points are those of the whole.
+    return in_space(places if by == "marker" else symmetry_of(state.mesh).middle(places))
 
 
 @lru_cache(maxsize=8)

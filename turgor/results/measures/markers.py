@@ -18,8 +18,8 @@ from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.material_line import at_points
 from turgor.results.measured import MeasuredPositions, read_positions
 from turgor.results.measures.registry import measure
-from turgor.results.sections import MOUNT, TIP_FACE
 from turgor.results.stored import StoredState
+from turgor.results.symmetry import MOUNT, TIP_FACE, surface_middle
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def marker_rmse(
         return math.nan
     gaps = (in_space(np.asarray(shares @ state.positions)) - measured)[:, table.measured]
     if length is None:
-        ends = [state.mesh.points[state.mesh.surface_nodes(surface)].mean(axis=0) for surface in (MOUNT, TIP_FACE)]
+        ends = [surface_middle(state.mesh, surface) for surface in (MOUNT, TIP_FACE)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
     return 100.0 * math.sqrt(float((gaps**2).sum(axis=1).mean())) / length
 

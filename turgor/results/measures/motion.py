@@ -11,8 +11,9 @@ import numpy.typing as npt
 from turgor.common.errors import InputError
 from turgor.mesh.mesh import in_space
 from turgor.results.measures.registry import measure
-from turgor.results.sections import MOUNT, TIP_FACE, motion, seen_from_mount
+from turgor.results.sections import motion, seen_from_mount
 from turgor.results.stored import StoredState
+from turgor.results.symmetry import MOUNT, TIP_FACE, surface_middle
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -49,13 +50,14 @@ def chord_angle(state: StoredState, *, base: str | None = None, tip: str | None 
 def elongation(state: StoredState) -> float:
     """Change in mm of the length of the line through the centres of the body's cross-sections, mount to tip.
 
-    Of a body of revolution it is the change of the distance between mount and tip face along the axis.
+    Of a body of revolution it is the change of the distance between mount and tip face along the axis, each the mean
+    over its area.
     """
     if state.body.kind != "axisymmetric":
         return motion(state.mesh, state.displacement).elongation
     at_rest, moved = (
-        [places[state.mesh.surface_nodes(name), 1].mean() for name in (MOUNT, TIP_FACE)]
-        for places in (state.mesh.points, state.positions)
+        [surface_middle(state.mesh, name, displacement, state.body.mechanics)[1] for name in (MOUNT, TIP_FACE)]
+        for displacement in (None, state.displacement)
     )
     return float(abs(moved[1] - moved[0]) - abs(at_rest[1] - at_rest[0]))
 
@@ -100,5 +102,8 @@ def max_displacement(displacement: FloatArray) -> float:
 
 def _place(state: StoredState, marker: str | None, surface: str) -> tuple[FloatArray, FloatArray]:
     """Return the mean place at rest and displacement, each ``(3,)``, of a marker or, without one, a surface."""
-    nodes = state.mesh.surface_nodes(surface) if marker is None else state.mesh.marker(marker)
+    if marker is None:
+        at_rest = surface_middle(state.mesh, surface)
+        return in_space(at_rest), in_space(surface_middle(state.mesh, surface, state.displacement) - at_rest)
+    nodes = state.mesh.marker(marker)
     return in_space(state.mesh.points[nodes].mean(axis=0)), in_space(state.displacement[nodes].mean(axis=0))
