@@ -93,23 +93,17 @@ def follow(
     with _telling_why(walk, post, ALONG_THE_ARC if isinstance(quantity, Volume) else None):
         for target in targets:
             while sign * (target - walk.measure(walk.here)) > _rounding(target):
-                previous, before = walk.here, walk.before
-                found = walk.advance(target)
-                if found is None:
+                previous = walk.here
+                stride = walk.stride(target)
+                if stride is None:
                     raise _nowhere(walk)
+                found, limit = stride
                 post.tally.count(found)
                 if on_progress is not None:
                     part = (walk.measure(found) - begin) / (targets[-1] - begin)
                     on_progress(part, found.iterations, found.residuals[-1])
-                if previous.rising != found.rising:
-                    try:
-                        limit = walk.limit_between(previous, found)
-                    except NotConvergedError:
-                        if not walk.goes_back(previous, before):
-                            raise
-                        continue
+                if limit is not None:
                     post.send_limit(limit)
-                    walk.stand_at(found, previous)
                 post.send_bifurcation(previous, found)
             post.send_once(walk.here)
     return post.sent

@@ -316,18 +316,16 @@ class _Walk:
         if step == 0.0:
             return None
         walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton, quantity)
-        previous, before = walk.here, None
-        for found in itertools.islice(walk, VOLUME_STEPS):
+        for _ in range(VOLUME_STEPS):
+            previous = walk.here
+            stride = walk.stride()
+            if stride is None:
+                return None
+            found, limit = stride
             self._tally.count(found)
             if self.on_progress is not None:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
-            if previous.rising and not found.rising:
-                try:
-                    limit = walk.limit_between(previous, found)
-                except NotConvergedError:
-                    if not walk.goes_back(previous, before):
-                        raise
-                    continue
+            if limit is not None and previous.rising:
                 if limit.equilibrium.fraction >= target:
                     return self._below(walk, target, previous, limit)
                 return self._passed(walk, limit, found)
@@ -338,11 +336,9 @@ class _Walk:
                     return None
             if walk.is_stable(found) is False and walk.is_stable(previous) is not False:
                 found = self._bifurcated(found)
-            before = previous
             self.past, self.here = (*self.past, previous)[-2:], found
             if found.event:
                 self.deliver()
-            previous = found
         return None
 
     def _below(self, walk: VolumeWalk, target: float, previous: Equilibrium, limit: LimitPoint) -> Equilibrium | None:

@@ -157,6 +157,32 @@ class VolumeWalk:
             return found
         return None
 
+    def stride(self, limit: float | None = None) -> tuple[Equilibrium, LimitPoint | None] | None:
+        """Return the next equilibrium as :meth:`advance`, with the limit of the load on the way to it, if there is one.
+
+        What looks like a limit, but cannot be located, may be a step to another branch: shorter ones are tried.
+
+        Raises
+        ------
+        NotConvergedError
+            If a limit cannot be located however short the step.
+        """
+        while True:
+            here, before = self.here, self.before
+            found = self.advance(limit)
+            if found is None or here.rising == found.rising:
+                return None if found is None else (found, None)
+            try:
+                point = self.limit_between(here, found)
+            except NotConvergedError:
+                self.step = CUT * (self.measure(found) - self.measure(here))
+                if abs(self.step) < self.smallest_part * abs(self.first_step):
+                    raise
+                self.stand_at(here, before)
+                continue
+            self.stand_at(found, here)
+            return found, point
+
     def is_doubtful(self, found: Equilibrium, part: float) -> bool:
         """Whether a shorter step should be tried, for what this one may hide or where it may have landed.
 
@@ -170,14 +196,6 @@ class VolumeWalk:
             log.info("the step ended in an unstable state")
             return True
         return False
-
-    def goes_back(self, here: Equilibrium, before: Equilibrium | None) -> bool:
-        """Stand at an earlier equilibrium again and make the next step shorter; no if it would be too short."""
-        self.step = CUT * (self.measure(self.here) - self.measure(here))
-        if abs(self.step) < self.smallest_part * abs(self.first_step):
-            return False
-        self.stand_at(here, before)
-        return True
 
     def stand_at(self, here: Equilibrium, before: Equilibrium | None, earlier: Equilibrium | None = None) -> None:
         """Go on from an equilibrium, predicting from it and one or two others."""
