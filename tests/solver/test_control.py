@@ -34,7 +34,7 @@ def pressure_at(system, state):
 
 
 def test_derivatives_of_the_gaps():
-    tangent = AlongTangent(0.1, 0.2, 2.0, np.array([0.6, 0.8]), 0.5)
+    tangent = AlongTangent(0.1, 0.2, 2.0, 0.5, tangent=np.array([0.6, 0.8]))
     controls = [FixedConjugate(0.3), AirAmount(0.2, FULL), ArcLength(0.1, 0.2, 2.0, 0.5), tangent]
     for control in controls:
         _, by_conjugate, by_fraction = control.gap(0.4, 0.7)

@@ -185,6 +185,11 @@ def refuse_twins(alike: Sequence[tuple[int, str]], what: str, file: Path | None 
         )
 
 
+def plain_names(header: Sequence[str]) -> list[str]:
+    """Return the names of a header's cells without their units, in small letters."""
+    return [header_unit(label)[0].strip().lower() for label in header]
+
+
 def header_unit(label: str) -> tuple[str, str | None]:
     """Split a header into its name and its unit, ``None`` if it has none."""
     match = _BRACKETS.search(label) or _UNIT_SUFFIX.search(label)

@@ -97,6 +97,11 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
+def is_same_file(copy: Path, path: Path) -> bool:
+    """Say whether a place that may be empty holds the very file at `path`."""
+    return copy.exists() and copy.samefile(path)
+
+
 class FolderLock:
     """The right to write into a folder; the system gives it back when the process ends, however it ends.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
-from turgor.materials.columns import header_unit, refuse_twins
+from turgor.materials.columns import header_unit, plain_names, refuse_twins
 from turgor.materials.tabular import Table, read_table
 
 FloatArray = npt.NDArray[np.float64]
@@ -64,7 +64,7 @@ def read_positions(file: Path) -> MeasuredPositions:
     table = read_table(file, _is_header, _lacks)
     columns = _columns(table.header)
     for name in columns:
-        refuse_twins([(i, table.header[i]) for i, n in enumerate(_names(table.header)) if n == name], name, file)
+        refuse_twins([(i, table.header[i]) for i, n in enumerate(plain_names(table.header)) if n == name], name, file)
     factors = {name: _factor(table, place, name) for name, place in columns.items() if name != "marker"}
     numbers = {name: np.array(table.numbers(place)) * factors.get(name, 1.0) for name, place in columns.items()}
     for name, values in numbers.items():
@@ -85,12 +85,8 @@ def read_positions(file: Path) -> MeasuredPositions:
 
 def _columns(cells: Sequence[str]) -> dict[str, int]:
     """Return the place of each column that is known by its name."""
-    names = _names(cells)
+    names = plain_names(cells)
     return {name: names.index(name) for name in ("pressure", "marker", *_AXES) if name in names}
-
-
-def _names(cells: Sequence[str]) -> list[str]:
-    return [header_unit(cell)[0].strip().lower() for cell in cells]
 
 
 def _check_markers(table: Table, place: int, markers: FloatArray) -> None:

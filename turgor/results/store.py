@@ -43,7 +43,7 @@ from turgor.results.archive import (
     save_record,
     save_vtu,
 )
-from turgor.results.files import LOCK, PARTIAL, FolderLock, json_text, read_json, read_text, write_text
+from turgor.results.files import LOCK, PARTIAL, FolderLock, is_same_file, json_text, read_json, read_text, write_text
 from turgor.results.history import as_csv, row
 from turgor.results.measures import Choice
 from turgor.results.record import StepRecord
@@ -364,7 +364,7 @@ def _read_store(folder: Path) -> tuple[Body, tuple[Choice, ...]]:
 
 def _check_foreign(folder: Path, files: Mapping[Path, str]) -> None:
     """Refuse a folder in which a run would replace what somebody else has put there."""
-    copies = [name for path, name in files.items() if not _is_same(folder / name, path)]
+    copies = [name for path, name in files.items() if not is_same_file(folder / name, path)]
     own = [folder / name for name in (*_FILES, *copies)]
     found = [path for path in own if path.exists()] + [path for p in _PATTERNS for path in folder.glob(p)]
     if found:
@@ -373,10 +373,6 @@ def _check_foreign(folder: Path, files: Mapping[Path, str]) -> None:
             file=found[0],
             expected="another folder (--out), or the file somewhere else",
         )
-
-
-def _is_same(copy: Path, path: Path) -> bool:
-    return copy.exists() and copy.samefile(path)
 
 
 def _remove_run(folder: Path) -> None:

@@ -8,7 +8,7 @@ measure of the state: a single one at a cavity is its volume, whatever the other
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -90,11 +90,8 @@ class AirAmount:
 
 
 @dataclass(frozen=True, eq=False)
-class ArcLength:
-    """A given distance from a point of the path, in the plane of Q and f (Riks 1979; Crisfield 1981).
-
-    It passes limits of the load and, other than volume control, places where the volume turns back; not where both turn
-    at once, as they do where another cavity than that of Q has its limit.
+class _FromPoint:
+    """A distance from a point of the path, in the plane of Q and f.
 
     Attributes
     ----------
@@ -114,10 +111,20 @@ class ArcLength:
     length: float
     weights: Floats | None = None
 
+    def _way(self, conjugate: float, fraction: float) -> tuple[float, float]:
+        return (conjugate - self.conjugate) / self.conjugate_scale, fraction - self.fraction
+
+
+class ArcLength(_FromPoint):
+    """The distance has a given value (Riks 1979; Crisfield 1981).
+
+    It passes limits of the load and, other than volume control, places where the volume turns back; not where both turn
+    at once, as they do where another cavity than that of Q has its limit.
+    """
+
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return the squared distance less the squared length."""
-        x = (conjugate - self.conjugate) / self.conjugate_scale
-        y = fraction - self.fraction
+        x, y = self._way(conjugate, fraction)
         return x * x + y * y - self.length**2, 2 * x / self.conjugate_scale, 2 * y
 
     def scale(self, conjugate: float) -> float:
@@ -127,37 +134,19 @@ class ArcLength:
 
 
 @dataclass(frozen=True, eq=False)
-class AlongTangent:
-    """A given distance from a point of the path along its tangent there, in the plane of Q and f (Riks 1979).
+class AlongTangent(_FromPoint):
+    """The distance along the unit `tangent` ``(2,)`` of the path at the point has a given value (Riks 1979).
 
     It finds where the first step begins to look: at the point itself the circle of :class:`ArcLength` has no slope.
-
-    Attributes
-    ----------
-    conjugate, fraction
-        The point.
-    conjugate_scale
-        What counts as one along Q.
-    tangent
-        The unit tangent ``(2,)``.
-    length
-        The distance.
-    weights
-        The weights of Q.
     """
 
-    conjugate: float
-    fraction: float
-    conjugate_scale: float
-    tangent: Floats
-    length: float
-    weights: Floats | None = None
+    tangent: Floats = field(kw_only=True)
 
     def gap(self, conjugate: float, fraction: float) -> tuple[float, float, float]:
         """Return the distance along the tangent less the length."""
-        x = (conjugate - self.conjugate) / self.conjugate_scale
+        x, y = self._way(conjugate, fraction)
         a, b = (float(part) for part in self.tangent)
-        return a * x + b * (fraction - self.fraction) - self.length, a / self.conjugate_scale, b
+        return a * x + b * y - self.length, a / self.conjugate_scale, b
 
     def scale(self, conjugate: float) -> float:
         """Return the length."""

@@ -256,7 +256,7 @@ class _Arc:
         guess, aim = here.state, here.fraction + length * float(self.direction[1])
         place, weights = (walk.measure(here), here.fraction, self.scale), walk.quantity.weights
         if before is None:
-            found = self._found(AlongTangent(*place, self.direction, length, weights), guess, aim)
+            found = self._found(AlongTangent(*place, length, weights, tangent=self.direction), guess, aim)
             guess, aim = found.state, found.fraction
         else:
             reach = length / float(np.linalg.norm(self._way(here, before)))
@@ -309,7 +309,7 @@ class _Post:
 
     def send_bifurcation(self, before: Equilibrium, found: Equilibrium) -> None:
         """Hand out a state where the walk stands if the path has lost its stability on the way to it."""
-        if self.walk.is_stable(found) is not False or self.walk.is_stable(before) is False:
+        if not self.walk.loses_stability(before, found):
             return
         log.warning("bifurcation between %.5g and %.5g of the load", before.fraction, found.fraction)
         self.send(replace(found, event=Event.BIFURCATION, mode=self.walk.softest_mode(found)))

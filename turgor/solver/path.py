@@ -24,7 +24,7 @@ from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.tangent import factorise_tangent
-from turgor.solver.volume import CUT, EASY, LimitPoint, VolumeWalk, compliance, is_monotone, softest_mode
+from turgor.solver.volume import CUT, EASY, LimitPoint, VolumeWalk, compliance, is_monotone, knows_volume, softest_mode
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
@@ -292,9 +292,7 @@ class _Walk:
     @property
     def _has_volume_control(self) -> bool:
         """Whether volume control may find what the load does not, and has not been tried from here."""
-        # It follows one potential; friction's changes from state to state.
-        knows = not (self.system.constraints.moves or self.system.rubs)
-        return knows and self.here is not self._tried_from
+        return knows_volume(self.system) and self.here is not self._tried_from
 
     def _by_volume(self, target: float) -> Equilibrium | None:
         """Follow the path by volume to the load fraction `target`, or to the limit before it.
@@ -334,7 +332,7 @@ class _Walk:
                     return self._attempt(target, found.state)
                 except NotConvergedError:
                     return None
-            if walk.is_stable(found) is False and walk.is_stable(previous) is not False:
+            if walk.loses_stability(previous, found):
                 found = self._bifurcated(found)
             self.past, self.here = (*self.past, previous)[-2:], found
             if found.event:

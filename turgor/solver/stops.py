@@ -15,7 +15,7 @@ from turgor.materials.stability import drucker_margin, verdict
 from turgor.mesh.faces import boundary_faces
 from turgor.solver.events import Outcome
 from turgor.solver.newton import Equilibrium, NotConvergedError
-from turgor.solver.volume import LimitPoint
+from turgor.solver.volume import LimitPoint, knows_volume
 
 Facts = dict[str, object]
 
@@ -110,7 +110,7 @@ def at_limit(
     facts["mode_largest_at_mm"] = [round(float(x), 3) for x in system.mesh.points[worst]]
     beyond = _beyond(system, limit.equilibrium)
     advice = "a thicker wall, a stiffer or a stiffening material raises the limit"
-    if system.cavities and not system.constraints.moves:
+    if system.cavities and knows_volume(system):
         advice = f"Control by volume follows it further; {advice}"
     advice = advice[0].upper() + advice[1:]
     cause = ""
@@ -219,7 +219,7 @@ def _cause(
         return Outcome.CONTACT, cause, advice, {"contact_area_mm2": area}
     cause = "the material and the elements are sound there"
     advice = "Try smaller steps (solver.largest_step, solver.smallest_step) or a finer mesh"
-    if instead and system.cavities and not (system.constraints.moves or system.rubs):
+    if instead and system.cavities and knows_volume(system):
         advice += f", or control {instead}"
     return Outcome.UNEXPLAINED, cause, advice, {"smallest_drucker_margin": worst.margin, "smallest_det_F": smallest}
 

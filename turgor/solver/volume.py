@@ -191,8 +191,7 @@ class VolumeWalk:
         if part > SHORT_ENOUGH and self._may_hide_limits(found):
             log.info("the step may hide limits")
             return True
-        lost = self.is_stable(found) is False and self.is_stable(self.here) is not False
-        if lost and part > FEW_CUTS * self.smallest_part:
+        if self.loses_stability(self.here, found) and part > FEW_CUTS * self.smallest_part:
             log.info("the step ended in an unstable state")
             return True
         return False
@@ -290,6 +289,10 @@ class VolumeWalk:
         """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
         return stable_while_held(self.system, self.quantity, equilibrium)
 
+    def loses_stability(self, before: Equilibrium, found: Equilibrium) -> bool:
+        """Say whether a state is unstable while the quantity is held, and the one before it was not seen to be."""
+        return self.is_stable(found) is False and self.is_stable(before) is not False
+
     @property
     def _sense(self) -> float:
         """The sign of the compliance of a stable state."""
@@ -304,6 +307,11 @@ class VolumeWalk:
             return False
         change = self._conjugate(found) - self._conjugate(self.here)
         return change == 0.0 or not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
+
+
+def knows_volume(system: System) -> bool:
+    """Whether the path can be followed by the conjugate of the load: friction and what moves have no one potential."""
+    return not (system.constraints.moves or system.rubs)
 
 
 def is_monotone(mean: float, at_start: float, at_end: float) -> bool:

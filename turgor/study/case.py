@@ -36,7 +36,7 @@ from turgor.study.materials import FittedMaterial, MaterialChoice
 from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
-from turgor.study.validation import StrictModel, explain, invalid
+from turgor.study.validation import StrictModel, collected, explain, invalid
 
 
 class MeshCase(StrictModel):
@@ -198,21 +198,16 @@ class Draft(Setup):
             expected = "pressures in order from 0 to the load's, the last equal to it"
         if target == 0.0:
             raise invalid("the outputs are pressures, and no load is one", key=key, expected="solver.steps instead")
-        values = [_output(text, what, f"{key}.{number}") for number, text in enumerate(self.solver.outputs)]
+        values = []
+        for number, text in enumerate(self.solver.outputs):
+            with collected(f"{key}.{number}"):
+                values.append(to_internal(text, what))
         fractions = tuple(value / target for value in values)
         ascending = all(low < high for low, high in zip((0.0, *fractions), fractions, strict=False))
         if not ascending or fractions[-1] != 1.0:
             end = "the load's" if what == "pressure" else "the end of the programmes"
             raise invalid(f"these {what}s do not lead from 0 to {end}", key=key, expected=expected)
         return fractions
-
-
-def _output(text: str, what: str, key: str) -> float:
-    try:
-        return to_internal(text, what)
-    except InputError as error:
-        failure = invalid(error.problem, key=key, value=text, expected=f"a {what} with its unit")
-    raise failure
 
 
 class Case(Draft):

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 from turgor.common.errors import InputError
 from turgor.common.units import PositivePressure, to_internal
 from turgor.solver.control import ATMOSPHERE
-from turgor.study.validation import StrictModel, invalid
+from turgor.study.validation import StrictModel, collected
 
 _PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
 
@@ -45,11 +45,8 @@ def volume_text(text: str) -> str:
 
 
 def _readable(text: str) -> str:
-    try:
+    with collected():
         return volume_text(text)
-    except InputError as error:
-        failure = invalid(error.problem, value=text, expected=error.expected)
-    raise failure
 
 
 VolumeText = Annotated[str, BeforeValidator(_readable)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from turgor.results.files import is_same_file
 from turgor.study.case import Case
 
 FOLDER = "data"
@@ -23,7 +24,7 @@ def copy_data(names: dict[Path, str], folder: Path) -> None:
     """Copy the data files into the run's folder; one that is there already stays."""
     for path, name in names.items():
         copy = folder / name
-        if not (copy.exists() and copy.samefile(path)):
+        if not is_same_file(copy, path):
             copy.parent.mkdir(exist_ok=True)
             shutil.copyfile(path, copy)
 

@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema
 from turgor.common.errors import InputError
 from turgor.common.units import INTERNAL_UNITS, Pressure, Time, to_internal, to_text
 from turgor.fem.programme import Programme
-from turgor.materials.columns import header_unit, refuse_twins
+from turgor.materials.columns import header_unit, plain_names, refuse_twins
 from turgor.materials.tabular import EXPECTED_HEADER, Table, read_table
 from turgor.study.materials import in_case_folder
 from turgor.study.validation import StrictModel, invalid
@@ -89,13 +89,13 @@ def written_out(value: object, cavity: object, info: ValidationInfo) -> object:
 
 def _read(path: Path, wanted: Sequence[str]) -> dict[str, Any]:
     def lacking(cells: Sequence[str]) -> str | None:
-        names = _names(cells)
+        names = plain_names(cells)
         if "time" not in names:
             return "there is no column 'time'" if _is_any(names, wanted) else None
         return None if _is_any(names, wanted) else f"there is no column {' or '.join(repr(name) for name in wanted)}"
 
     def fits(cells: Sequence[str]) -> bool:
-        return "time" in _names(cells) and _is_any(_names(cells), wanted)
+        return "time" in plain_names(cells) and _is_any(plain_names(cells), wanted)
 
     try:
         table = read_table(path, fits, lacking)
@@ -104,7 +104,7 @@ def _read(path: Path, wanted: Sequence[str]) -> dict[str, Any]:
         expected = header if error.expected in (None, EXPECTED_HEADER) else error.expected
         problem = error.problem if "strain" not in error.problem else "no header with a time and a pressure was found"
         raise InputError(problem, file=error.file, key=error.key, value=error.value, expected=expected) from None
-    names = _names(table.header)
+    names = plain_names(table.header)
     pressure = next(name.lower() for name in wanted if name.lower() in names)
     for known in ("time", pressure):
         refuse_twins([(i, table.header[i]) for i, name in enumerate(names) if name == known], known, path)
@@ -112,10 +112,6 @@ def _read(path: Path, wanted: Sequence[str]) -> dict[str, Any]:
         "time": _column(table, names.index("time"), "time"),
         "pressure": _column(table, names.index(pressure), "pressure"),
     }
-
-
-def _names(header: Sequence[str]) -> list[str]:
-    return [header_unit(label)[0].strip().lower() for label in header]
 
 
 def _is_any(names: Sequence[str], wanted: Sequence[str]) -> bool:

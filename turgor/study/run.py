@@ -20,6 +20,7 @@ from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
 from turgor.results.files import UnwritableError
+from turgor.results.history import PRESSURE_PREFIX
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore
@@ -41,9 +42,6 @@ from turgor.study.runlog import RunLog
 from turgor.study.states import Recorder, to_equilibrium
 
 log = logger("study")
-
-PRESSURE = "pressure:"
-"""What the names of pressures begin with (:attr:`turgor.fem.system.System.load_names`)."""
 
 SAME = 1e-3
 """Two limits whose loads differ by less than this part are one."""
@@ -240,7 +238,7 @@ class _Running:
             "vacuum": (
                 f"{_load_text(name, value)} at step {record.index} is deeper than a vacuum: no cavity of air gets there"
                 for name, value in record.loads.items()
-                if name.startswith(PRESSURE) and value < -ATMOSPHERE
+                if name.startswith(PRESSURE_PREFIX) and value < -ATMOSPHERE
             ),
             "volume": (
                 f"{name} encloses less than nothing at step {record.index}: its walls have passed through each other, "
@@ -317,6 +315,6 @@ def _bifurcation(history: Sequence[Row]) -> Row | None:
 
 def _load_text(name: str, value: float) -> str:
     _, _, place = name.partition(":")
-    if name.startswith(PRESSURE):
+    if name.startswith(PRESSURE_PREFIX):
         return f"{from_internal(value, 'pressure', 'kPa'):.4g} kPa in {place}"
     return f"{name} × {value:.4g}"

@@ -80,14 +80,17 @@ def invalid(problem: str, *, key: str | None = None, value: object = None, expec
 
 
 @contextlib.contextmanager
-def collected() -> Iterator[None]:
-    """Hand an InputError of a room below to pydantic, which adds the place; :func:`explain` words it."""
+def collected(key: str | None = None) -> Iterator[None]:
+    """Hand an InputError of a room below to pydantic, which adds the place; :func:`explain` words it.
+
+    `key` is the part of the place that pydantic does not know, where a validator looks at several keys.
+    """
     try:
         yield
     except InputError as error:
         # Without its key, which names the argument of a function rather than the place in the case.
-        placeless = InputError(error.problem, value=error.value, expected=error.expected)
-        raise ValueError(error.problem) from placeless
+        placed = InputError(error.problem, key=key, value=error.value, expected=error.expected)
+        raise ValueError(error.problem) from placed
 
 
 def _words(finding: ErrorDetails) -> tuple[str, object, str | None]:
