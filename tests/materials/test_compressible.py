@@ -73,3 +73,58 @@ def test_volumetric_test_alone_or_wrong_way_round_is_refused():
     x = np.linspace(1.0, 2.0, 20)
     tests = [MaterialTest("uniaxial", x, x - x**-2), MaterialTest("volumetric", J, -800.0 * (J - 1))]
     assert "bulk modulus" in fit(tests, "neo-hookean").fits[0].remark
+
+
+def compressible_test(material, noise: float = 0.0, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    x = np.linspace(1.0, 1.8, 30)
+    lateral, stress = free_response(material, "uniaxial", x)
+    return MaterialTest(
+        "uniaxial",
+        x,
+        stress + noise * material.shear_modulus * rng.standard_normal(len(x)),
+        lateral=lateral + noise * rng.standard_normal(len(x)),
+    )
+
+
+def test_intervals_and_criteria_are_those_of_the_compressible_fit():
+    material = create("ogden-1", {"mu1": 0.03, "alpha1": 3.0}, poisson=0.35)
+    inside = []
+    for seed in range(60):
+        found = fit(compressible_test(material, 3e-3, seed), "ogden-1").fits[0]
+        inside += [low <= material.parameters[name] <= high for name, (low, high) in found.confidence.items()]
+        assert found.confidence["mu1"][0] < found.parameters["mu1"] < found.confidence["mu1"][1]
+    assert 0.9 <= np.mean(inside) < 1.0
+    report = fit(compressible_test(material, 3e-3), ["ogden-1", "neo-hookean"])
+    assert report["ogden-1"].aic < report["neo-hookean"].aic
+    assert report["ogden-1"].correlation.shape == (2, 2)
+
+
+def test_bounds_hold_in_compressible_fits():
+    material = create("ogden-1", {"mu1": 0.03, "alpha1": 3.0}, poisson=0.35)
+    found = fit(compressible_test(material), "ogden-1", bounds={"alpha1": (1.0, 2.0)}).fits[0]
+    assert found.parameters["alpha1"] == pytest.approx(2.0)
+    assert found.material.poisson_ratio < 0.45
+
+
+def test_a_constrained_fit_stays_stable_where_the_volume_is_fitted_too():
+    softening = create("mooney-rivlin-2", {"C10": 0.1, "C01": -0.02}, poisson=0.4)
+    test = compressible_test(softening)
+    plain, kept = (
+        fit(test, "mooney-rivlin-2", stability=choice, stable_to=3.0).fits[0] for choice in ("ignore", "require")
+    )
+    assert not plain.stable
+    assert kept.stable
+    assert kept.parameters["C01"] > plain.parameters["C01"]
+    assert kept.material.poisson_ratio == pytest.approx(0.4, abs=0.05)
+
+
+def test_a_test_of_no_weight_does_not_count():
+    material = create("neo-hookean", {"C10": 0.0134}, poisson=0.32)
+    x = np.linspace(1.0, 1.5, 12)
+    foreign = MaterialTest("uniaxial", x, 10.0 * (x - 1.0), lateral=np.ones_like(x))
+    test = compressible_test(material, 1e-3)
+    alone, beside = fit(test, "neo-hookean").fits[0], fit([test, foreign], "neo-hookean", weights=(1, 0)).fits[0]
+    for name in ("parameters", "confidence", "rmse", "residual_norm", "r2", "aic", "bic"):
+        assert getattr(beside, name) == getattr(alone, name), name
+    assert beside.material.poisson_ratio == alone.material.poisson_ratio

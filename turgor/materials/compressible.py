@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from turgor.common.errors import InputError
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.kinematics import Array
-from turgor.materials.least_squares import Problem, predict
+from turgor.materials.least_squares import Problem, Solution, bounds_of, central_difference, predict
 from turgor.materials.measurement import MaterialTest
 
 _ITERATIONS = 60
+_STARTS = (1.5, 5.0, 50.0)
+"""Ratios of bulk to shear modulus from which compressible fits are searched."""
+
+_FAR = 1e3
+"""Residual of a trial that has no finite stress."""
+
 _TRANSVERSE = {"uniaxial": (1, 2), "equibiaxial": (2,), "planar": (2,)}
 """The directions in which each mode is free to contract."""
 
@@ -81,7 +88,9 @@ def _principal_stress(material: Hyperelastic, mode: str, stretch: Array, lateral
     return stress
 
 
-def fit_compressible(material: Hyperelastic, problem: Problem) -> tuple[Hyperelastic, Array, str]:
+def fit_compressible(
+    material: Hyperelastic, problem: Problem, *, in_proportion: bool = False
+) -> tuple[Hyperelastic, Solution]:
     """Fit all constants and the bulk modulus to stress and lateral stretch together.
 
     Parameters
@@ -90,39 +99,88 @@ def fit_compressible(material: Hyperelastic, problem: Problem) -> tuple[Hyperela
         The incompressible fit, the start.
     problem
         The tests; those without lateral stretch count by their stress alone, at the same compressibility.
+    in_proportion
+        Whether to fit only how large the moduli are, all by one factor, beside the bulk modulus: a material that was
+        made to keep limits keeps them.
 
     Returns
     -------
     tuple
-        The material, the residual of its nominal stress at all points, and a remark that names Poisson's ratio.
-    """
-    kind = type(material)
-    scale = np.array([max(abs(value), 1e-6) for value in material.parameters.values()])
-    stress_scale = float(np.abs(problem.stress * problem.weights).max())
+        The material, and the solution, whose Jacobian ends in a column for the logarithm of the bulk modulus.
 
-    def built(x: Array) -> Hyperelastic:
-        trial = kind.trial((x[:-1] * scale).tolist())
-        law = dataclasses.replace(material.volumetric, bulk_modulus=float(np.exp(x[-1])) * material.shear_modulus)
+    Raises
+    ------
+    InputError
+        If the constants found are not those of a material.
+    """
+    fitted = _Lateral(material, problem)
+    search = fitted.search_in_proportion if in_proportion else fitted.search
+    values = min((search(ratio) for ratio in _STARTS), key=lambda x: float(np.sum(fitted.residual(x) ** 2)))
+    found = fitted.material(values)
+    found = dataclasses.replace(type(material).of(found.parameters), volumetric=found.volumetric)
+    errors = np.concatenate([_response(found, test)[1] - test.stress for test in problem.tests])
+    jacobian = np.column_stack([central_difference(fitted.residual, values, i) for i in range(len(values))])
+    return found, Solution(values[:-1], errors, fitted.residuals(values), jacobian)
+
+
+class _Lateral:
+    """Residuals of stress and lateral stretch, relative to the largest, by the constants and the logarithm of K."""
+
+    def __init__(self, material: Hyperelastic, problem: Problem) -> None:
+        self.start, self.kind = material, type(material)
+        self.constants = np.array(list(material.parameters.values()))
+        self.bounds = bounds_of(self.kind, problem)
+        parts = zip(problem.tests, problem.factors, problem.point_weights, strict=True)
+        self.parts = [part for part in parts if part[1] > 0]
+        self.largest = max(float(np.abs(weights * test.stress).max()) for test, _, weights in self.parts)
+        self.heaviest = max(problem.factors)
+
+    def material(self, values: Array) -> Hyperelastic:
+        trial = self.kind.trial(values[:-1].tolist())
+        law = dataclasses.replace(self.start.volumetric, bulk_modulus=float(np.exp(values[-1])))
         object.__setattr__(trial, "volumetric", law)
         return trial
 
-    def residual(x: Array) -> Array:
-        trial = built(x)
-        parts = []
-        for test, weight in zip(problem.tests, problem.point_weights, strict=True):
+    def residuals(self, values: Array) -> tuple[Array, Array]:
+        """Return those of the stress and those of the lateral stretch."""
+        trial = self.material(values)
+        of_stress, of_stretch = [], []
+        for test, factor, weights in self.parts:
             lateral, stress = _response(trial, test)
-            parts.append(weight * (stress - test.stress) / stress_scale)
+            of_stress.append(weights / self.largest * (stress - test.stress))
             if test.lateral is not None:
-                parts.append((lateral - test.lateral) / float(np.ptp(test.lateral) or 1.0))
-        return np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3)
+                weight = factor / self.heaviest / float(np.ptp(test.lateral) or 1.0)
+                of_stretch.append(weight * (lateral - test.lateral))
+        return _finite(np.concatenate(of_stress)), _finite(np.concatenate(of_stretch))
 
-    starts = [np.append(np.array(list(material.parameters.values())) / scale, np.log(k)) for k in (1.5, 5.0, 50.0)]
-    found = min((least_squares(residual, s, xtol=1e-14, ftol=1e-14, gtol=1e-14) for s in starts), key=lambda f: f.cost)
-    final = built(found.x)
-    checked = dataclasses.replace(kind.of(final.parameters), volumetric=final.volumetric)
-    errors = [_response(checked, test)[1] - test.stress for test in problem.tests]
-    remark = f"compressible, fitted to the lateral strain: Poisson's ratio {checked.poisson_ratio:.4g}"
-    return checked, np.concatenate(errors), remark
+    def residual(self, values: Array) -> Array:
+        return np.concatenate(self.residuals(values))
+
+    def search(self, ratio: float) -> Array:
+        """Return the values found from the constants of the start and a bulk modulus of so many shear moduli."""
+        scale = np.append(np.maximum(np.abs(self.constants), 1e-6), 1.0)
+        low, high = np.vstack([self.bounds, [-np.inf, np.inf]]).T / scale
+        start = np.clip(np.append(self.constants, np.log(ratio * self.start.shear_modulus)) / scale, low, high)
+        return scale * _least(lambda x: self.residual(scale * x), start, (low, high))
+
+    def search_in_proportion(self, ratio: float) -> Array:
+        """Return the values found if the moduli change by one factor only."""
+        linear = np.array([constant.linear for constant in self.kind.constants()])
+
+        def values(x: Array) -> Array:
+            return np.append(np.where(linear, np.exp(x[0]), 1.0) * self.constants, x[1])
+
+        start = np.array([0.0, np.log(ratio * self.start.shear_modulus)])
+        return values(_least(lambda x: self.residual(values(x)), start, (-np.inf, np.inf)))
+
+
+def _least(residual: Callable[[Array], Array], start: Array, bounds: tuple[ArrayLike, ArrayLike]) -> Array:
+    found = least_squares(residual, start, bounds=bounds, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    return np.asarray(found.x, dtype=float)
+
+
+def _finite(residual: Array) -> Array:
+    return np.nan_to_num(residual, nan=_FAR, posinf=_FAR, neginf=-_FAR)
 
 
 def _response(material: Hyperelastic, test: MaterialTest) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from turgor.materials.compressible import fit_bulk_modulus, fit_compressible
 from turgor.materials.fit_result import CONSTRAINED, Fit, FitReport, biaxial_ratios, recommend
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.inequalities import Limits
-from turgor.materials.kinematics import Array
 from turgor.materials.least_squares import Problem, Solution, solve
 from turgor.materials.measurement import MaterialTest, Specimen
 from turgor.materials.models.ogden import OgdenModel
@@ -33,9 +32,6 @@ PLAUSIBLE_RATIOS = {1.5: (1.0, 1.5), 2.0: (0.95, 1.8)}
 SAMPLES_OF_STABILITY = (24, 200)
 """Stretches of each mode at which a constrained fit keeps stability; the finer ones where it is lost in between and
 the model is linear, for that takes no time."""
-
-RELATIVE_FLOOR = 0.02
-"""With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
 
 
 def fit(
@@ -63,7 +59,8 @@ def fit(
     error
         ``"absolute"``: every point counts by its residual in MPa; ``"relative"``: by residual over stress.
     weights
-        One factor for each test, in the order of reading; its points count by its square.
+        One factor for each test, in the order of reading; its points count by its square. A test with 0 is shown,
+        but nothing is fitted to it or counted of it.
     bounds
         Narrower bounds of constants by name, in MPa or as numbers, for every model that has them.
     stability
@@ -92,7 +89,9 @@ def fit(
         mechanical = tuple(test.within(*span) for test in mechanical)
     if not mechanical:
         raise InputError("there is only a volumetric test", key="data", expected="a test that changes the shape")
-    problem = Problem(mechanical, _point_weights(mechanical, error, weights), dict(bounds or {}))
+    if error not in ("absolute", "relative"):
+        raise InputError("unknown kind of error", key="error", value=error, expected="absolute or relative")
+    problem = Problem(mechanical, _factors(mechanical, weights), error == "relative", dict(bounds or {}))
     stretch = largest_stretch(mechanical) if stable_to is None else stable_to
     if not stretch >= 1.0:
         raise InputError("this stretch must be above 1", key="stable_to", value=stable_to)
@@ -103,7 +102,7 @@ def fit(
     if not fits:
         raise InputError("no constants of these models keep the limits", key="models", expected="other models")
     fits.sort(key=lambda found: found.aic - 2.0 * len(found.parameters) if error == "relative" else found.residual_norm)
-    largest = float(np.abs(problem.stress).max())
+    largest = max(float(np.abs(test.stress).max()) for test in problem.counted)
     best, reason = recommend(fits, largest)
     return FitReport(tuple(fits), best.model if best else None, reason, mechanical + tuple(volumetric), span, error)
 
@@ -128,19 +127,12 @@ def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[Mate
     return tuple(tests)
 
 
-def _point_weights(tests: Sequence[MaterialTest], error: str, weights: Sequence[float] | None) -> tuple[Array, ...]:
-    if error not in ("absolute", "relative"):
-        raise InputError("unknown kind of error", key="error", value=error, expected="absolute or relative")
-    factors = [1.0] * len(tests) if weights is None else [float(weight) for weight in weights]
+def _factors(tests: Sequence[MaterialTest], weights: Sequence[float] | None) -> tuple[float, ...]:
+    factors = tuple(1.0 for _ in tests) if weights is None else tuple(float(weight) for weight in weights)
     if len(factors) != len(tests) or not all(0 <= f < np.inf for f in factors) or not any(factors):
         expected = f"{len(tests)} numbers, one for each test, none negative"
         raise InputError("these weights do not fit the tests", key="weights", value=weights, expected=expected)
-    found = []
-    for test, factor in zip(tests, factors, strict=True):
-        size = np.abs(test.stress)
-        scale = np.maximum(size, RELATIVE_FLOOR * size.max()) if error == "relative" else np.ones_like(size)
-        found.append(factor / np.where(scale > 0, scale, 1.0))
-    return tuple(found)
+    return factors
 
 
 _RANGE = re.compile(r"\s*(?P<low>[^:]*?)\s*(?P<low_percent>%?)\s*:\s*(?P<high>[^:]*?)\s*(?P<high_percent>%?)\s*")
@@ -195,7 +187,7 @@ def _fits_of(
     if stability not in ("prefer", "require", "ignore"):
         expected = "prefer, require or ignore"
         raise InputError("unknown choice", key="stability", value=stability, expected=expected)
-    biaxial_measured = any(test.mode in ("equibiaxial", "planar") for test in problem.tests)
+    biaxial_measured = any(test.mode in ("equibiaxial", "planar") for test in problem.counted)
     found = []
     if stability != "require":
         plain = solve(kind, problem)
@@ -229,22 +221,25 @@ def _judged(
     constrained: bool,
 ) -> Fit:
     """Turn constants into a fit with its numbers and verdicts."""
-    parameters = {c.name: float(v) for c, v in zip(kind.constants(), solution.values, strict=True)}
+    parameters = _named(kind, solution)
     remark = ""
     material: Hyperelastic | None = None
     try:
         material = fit_bulk_modulus(kind.of(parameters), volumetric)
+        if any(test.lateral is not None for test in problem.counted):
+            material, solution = fit_compressible(material, problem, in_proportion=constrained)
+            parameters = _named(kind, solution)
+            remark = f"compressible, fitted to the lateral strain: Poisson's ratio {material.poisson_ratio:.4g}"
     except InputError as wrong:
         remark = str(wrong)
-    residual = problem.prediction(kind.trial(list(solution.values))) - problem.stress
-    if material is not None and any(test.lateral is not None for test in problem.tests):
-        material, residual, remark = fit_compressible(material, problem)
-        parameters = material.parameters
+    counts = problem.weights > 0
+    residual, stress = solution.residual[counts], problem.stress[counts]
     squares = float(residual @ residual)
-    spread = float(np.sum((problem.stress - problem.stress.mean()) ** 2))
-    size = float(np.linalg.norm(problem.stress))
-    numbers = statistics(solution.jacobian, problem.weights, solution.cost)
-    intervals = zip(parameters.items(), numbers.half_widths.tolist(), strict=True)
+    spread = float(np.sum((stress - stress.mean()) ** 2))
+    size = float(np.linalg.norm(stress))
+    numbers = statistics(solution.jacobian, solution.weighted)
+    n = len(parameters)  # the bulk modulus, where it was fitted too, comes behind them
+    intervals = zip(parameters.items(), numbers.half_widths[:n].tolist(), strict=True)
     return Fit(
         model=kind.name + (CONSTRAINED if constrained else ""),
         material=material,
@@ -258,9 +253,13 @@ def _judged(
         stable=material is not None and stable_up_to(material, stretch),
         stability=verdict(material) if material else None,
         confidence={} if constrained else {name: (v - half, v + half) for (name, v), half in intervals},
-        correlation=numbers.correlation,
+        correlation=numbers.correlation[:n, :n],
         digit_sensitivity=digit_sensitivity(material, largest_stretch(problem.tests)) if material else np.inf,
         biaxial_ratios=biaxial_ratios(material) if material else {},
-        biaxial_measured=any(test.mode == "equibiaxial" for test in problem.tests),
+        biaxial_measured=any(test.mode == "equibiaxial" for test in problem.counted),
         remark=remark,
     )
+
+
+def _named(kind: type[Hyperelastic], solution: Solution) -> dict[str, float]:
+    return {c.name: float(v) for c, v in zip(kind.constants(), solution.values, strict=True)}

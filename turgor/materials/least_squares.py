@@ -7,7 +7,7 @@ only one to four constants are searched for, from a fixed list of starts: the sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,6 +30,9 @@ MINIMA_POLISHED = 3
 SCREENING_POINTS = 40
 """Starts are compared on so many points of each test."""
 
+RELATIVE_FLOOR = 0.02
+"""With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
+
 _TINY = 1e-300
 _FAR = 1e3
 """Residual of a trial that has no finite stress or keeps no limit, relative to the measured stress."""
@@ -48,14 +51,41 @@ def predict(material: Hyperelastic, test: MaterialTest) -> Array:
 
 @dataclass(frozen=True)
 class Problem:
-    """The tests of one fit with the weight of each of their points: Σ (weight · residual)² is made least.
+    """The tests of one fit and how much each counts: Σ (weight · residual)² of their points is made least.
 
-    ``bounds`` narrow the constants of any model by name.
+    Attributes
+    ----------
+    tests
+        Tests with a stress, at least one.
+    factors
+        What the weights of each test's points are multiplied by; a test with 0 does not count at all.
+    relative
+        Whether a point counts by its residual over its stress instead of by its residual.
+    bounds
+        Narrower bounds of the constants of any model by name.
     """
 
     tests: tuple[MaterialTest, ...]
-    point_weights: tuple[Array, ...]
+    factors: tuple[float, ...]
+    relative: bool = False
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def counted(self) -> tuple[MaterialTest, ...]:
+        """The tests that count."""
+        return tuple(test for test, factor in zip(self.tests, self.factors, strict=True) if factor > 0)
+
+    @property
+    def point_weights(self) -> tuple[Array, ...]:
+        """Weights of the points of each test."""
+        return tuple(self._weights_of(*pair) for pair in zip(self.tests, self.factors, strict=True))
+
+    def _weights_of(self, test: MaterialTest, factor: float) -> Array:
+        size = np.abs(test.stress)
+        if not self.relative or not np.any(size):
+            return np.full_like(size, factor)
+        weights: Array = factor / np.maximum(size, RELATIVE_FLOOR * size.max())
+        return weights
 
     @property
     def stress(self) -> Array:
@@ -74,20 +104,32 @@ class Problem:
 
     def thinned(self, points: int) -> Problem:
         """Return the problem with at most about `points` points of each test, evenly chosen."""
-        tests, weights = [], []
-        for test, weight in zip(self.tests, self.point_weights, strict=True):
+        tests = []
+        for test in self.tests:
             chosen = np.unique(np.linspace(0, len(test.stretch) - 1, points).astype(int))
             tests.append(MaterialTest(test.mode, test.stretch[chosen], test.stress[chosen]))
-            weights.append(weight[chosen])
-        return replace(self, tests=tuple(tests), point_weights=tuple(weights))
+        return replace(self, tests=tuple(tests))
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Constants in the model's order, the weighted cost, and the Jacobian of the stresses by the constants."""
+    """What least squares found.
+
+    Attributes
+    ----------
+    values
+        Constants in the model's order.
+    residual
+        Predicted less measured nominal stress at all points, MPa.
+    weighted
+        The weighted residuals that count, by what was measured: of the stress, and of the lateral stretch if fitted.
+    jacobian
+        Derivatives of these, one after the other, by the constants, ``(residuals, constants)``.
+    """
 
     values: Array
-    cost: float
+    residual: Array
+    weighted: tuple[Array, ...]
     jacobian: Array
 
 
@@ -126,8 +168,29 @@ def solve(model: type[Hyperelastic], problem: Problem, limits: Limits | None = N
     if relative[0] == _FAR:
         return None
     values = linear.assemble(moduli, best)
-    residual = linear.weights * (linear.prediction(values) - linear.stress)
-    return Solution(values, float(residual @ residual), _jacobian(values, linear))
+    residual = linear.prediction(values) - linear.stress
+    counts, weights = linear.weights > 0, linear.weights[linear.weights > 0]
+    jacobian = _jacobian(values, linear)[counts] * weights[:, None]
+    return Solution(values, residual, (weights * residual[counts],), jacobian)
+
+
+def bounds_of(model: type[Hyperelastic], problem: Problem) -> Array:
+    """Return the bounds of each constant, narrowed by those of the problem, ``(constants, 2)``.
+
+    Raises
+    ------
+    InputError
+        If nothing is left between them.
+    """
+    return np.array([_narrowed(c.bounds, problem.bounds.get(c.name), c.name) for c in model.constants()])
+
+
+def central_difference(function: Callable[[Array], Array], values: Array, i: int) -> Array:
+    """Return the derivative of `function` by the `i`-th of its `values`."""
+    step = np.zeros_like(values)
+    step[i] = 1e-6 * max(abs(values[i]), 1e-2)
+    derivative: Array = (function(values + step) - function(values - step)) / (2.0 * step[i])
+    return derivative
 
 
 class _Linear:
@@ -136,7 +199,7 @@ class _Linear:
     def __init__(self, model: type[Hyperelastic], problem: Problem, limits: Limits | None) -> None:
         self.model, self.problem, self.limits = model, problem, limits
         constants = model.constants()
-        bounds = np.array([_narrowed(c.bounds, problem.bounds.get(c.name), c.name) for c in constants])
+        bounds = bounds_of(model, problem)
         self.moduli = [i for i, constant in enumerate(constants) if constant.linear]
         self.searched = [i for i, constant in enumerate(constants) if not constant.linear]
         self.bounds = bounds[self.moduli].T
@@ -243,9 +306,5 @@ def _jacobian(values: Array, linear: _Linear) -> Array:
     J = np.empty((len(linear.stress), len(values)))
     J[:, linear.moduli] = linear.columns(values[linear.searched])
     for i in linear.searched:
-        step = 1e-6 * max(abs(values[i]), 1e-2)
-        up, down = values.copy(), values.copy()
-        up[i] += step
-        down[i] -= step
-        J[:, i] = (linear.prediction(up) - linear.prediction(down)) / (2.0 * step)
+        J[:, i] = central_difference(linear.prediction, values, i)
     return J

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,35 +23,36 @@ class Statistics:
     bic: float
 
 
-def statistics(jacobian: Array, weights: Array, cost: float) -> Statistics:
-    """Linearised statistics at the minimum of Σ (weight · residual)².
+def statistics(jacobian: Array, residuals: Sequence[Array]) -> Statistics:
+    """Linearised statistics at the minimum of the sum of squared residuals.
 
     Parameters
     ----------
     jacobian
-        Derivatives of the prediction by the constants, ``(points, constants)``.
-    weights
-        Weight of each point, ``(points,)``.
-    cost
-        Σ (weight · residual)².
+        Derivatives of the weighted residuals by the constants, ``(n, k)``.
+    residuals
+        The weighted residuals in parts, each of a variance of its own; together ``(n,)``.
 
     Notes
     -----
-    The covariance is s² (JᵀW²J)⁻¹ with s² = cost/(points − constants) (Seber and Wild 1989, §2.1); constants that the
-    tests do not determine have infinite widths. AIC = n ln(cost/n) + 2 k, BIC = n ln(cost/n) + k ln n with k the
-    constants and the variance.
+    The covariance is (JᵀJ)⁻¹ JᵀVJ (JᵀJ)⁻¹ with the variances V of the parts, the mean of their squared residuals times
+    n/(n − k): s² (JᵀJ)⁻¹ of one part (Seber and Wild 1989, §2.1; White 1980 for several). Constants that the tests do
+    not determine have infinite widths. AIC = Σ m ln(cost/m) + 2 p over the parts of m residuals each, BIC with p ln n,
+    where p counts the constants and the variances.
     """
     n, k = jacobian.shape
-    logarithm = n * np.log(max(cost, 1e-300) / n)
-    aic, bic = logarithm + 2.0 * (k + 1), logarithm + (k + 1) * np.log(n)
-    A = jacobian * weights[:, None]
-    norms = np.linalg.norm(A, axis=0)
+    sizes = np.array([len(part) for part in residuals])
+    variances = np.array([max(float(part @ part), 1e-300) for part in residuals]) / sizes
+    logarithm, p = float(sizes @ np.log(variances)), k + len(residuals)
+    norms = np.linalg.norm(jacobian, axis=0)
     half_widths, correlation = np.full(k, np.inf), np.eye(k)
-    if n > k and np.all(np.isfinite(A)) and np.all(norms > 0):
-        _, s, Vt = np.linalg.svd(A / norms, full_matrices=False)
+    if n > k and np.all(np.isfinite(jacobian)) and np.all(norms > 0):
+        U, s, Vt = np.linalg.svd(jacobian / norms, full_matrices=False)
         if s[-1] > 1e-12 * s[0]:
-            scaled = (Vt.T / s**2) @ Vt
-            deviation = np.sqrt(np.diag(scaled))
-            half_widths = student_t.ppf(0.5 + LEVEL / 2.0, n - k) * np.sqrt(cost / (n - k)) * deviation / norms
-            correlation = scaled / np.outer(deviation, deviation)
-    return Statistics(half_widths, correlation, float(aic), float(bic))
+            root = np.sqrt(np.repeat(variances, sizes) * n / (n - k))
+            spread = (Vt.T / s) @ (U * root[:, None]).T
+            covariance = spread @ spread.T
+            deviation = np.sqrt(np.diag(covariance))
+            half_widths = student_t.ppf(0.5 + LEVEL / 2.0, n - k) * deviation / norms
+            correlation = covariance / np.outer(deviation, deviation)
+    return Statistics(half_widths, correlation, logarithm + 2.0 * p, float(logarithm + p * np.log(n)))
