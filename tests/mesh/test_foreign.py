@@ -140,6 +140,11 @@ def test_cells_that_another_program_turns_the_other_way_are_turned(tmp_path):
         (("17, 18, 29, 30, 31, 32", "17, 18, 29, 30, 31"), "too few or too many nodes"),
         (("1., 3.", "1., x"), "not a readable mesh file"),
         (("*Elset, elset=Lower\n 7,", "*Elset, elset=Lower\n 7, 9"), "a cell is in the sets 'LOWER' and 'UPPER'"),
+        (
+            ("*Elset, elset=Lower\n 7,", "*Elset, elset=Lower, generate\n 7, 7, 0"),
+            "GENERATE.*7, 7, 0.*a step of 1",
+        ),
+        (("*Elset, elset=Lower\n 7,", "*Elset, elset=Lower, generate\n 7, 999999999999"), "GENERATE.*at most 10000000"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(change, message, tmp_path):

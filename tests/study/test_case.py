@@ -172,6 +172,34 @@ def test_a_shape_may_come_from_a_step_file(tmp_path: Path) -> None:
     assert {"mount", "tip-face", "cavity"} <= mesh_case(case).surfaces.keys()
 
 
+def test_copies_of_data_files_have_names_of_their_own(tmp_path: Path) -> None:
+    curve = "strain,stress (MPa)\n" + "".join(f"{0.1 * k},{0.01 * k}\n" for k in range(8))
+    files = ["a/2-pull.csv", "a/pull.csv", "b/pull.csv", "c/PULL.csv", "d/pull.csv"]
+    for name in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(curve, encoding="utf-8")
+    text = (EXAMPLES[0].parent / "tube.yaml").read_text(encoding="utf-8")
+    (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
+    fitted = f"materials={{body: {{fit: [{', '.join(files)}], models: [neo-hookean]}}}}"
+    names = data_names(load_case(tmp_path / "case.yaml", [fitted]))
+    assert [path.relative_to(tmp_path).as_posix() for path in names] == files
+    assert len({name.lower() for name in names.values()}) == len(files)
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ("name=../up", "name"),
+        ("regions={'a/b': {inside: {half-space: {normal: [0, 0, 1], above: 3 mm}}}}", "regions.a/b"),
+        ("measures=[{displacement: {at: [0 mm, 0 mm, 0 mm], name: '../../up'}}]", "measures.0.displacement.name"),
+    ],
+)
+def test_names_that_become_files_are_names(small_tube: Path, change: str, key: str) -> None:
+    with pytest.raises(InputError, match="cannot be a name") as found:
+        load_case(small_tube, [change])
+    assert found.value.key == key
+
+
 def test_the_schema_names_every_key_and_template() -> None:
     schema = Case.model_json_schema()
     assert set(schema["properties"]) == set(Case.model_fields)

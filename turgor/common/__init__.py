@@ -1,1 +1,1 @@
-"""Units, errors, log and optional packages: what every other room may use."""
+"""Units, names, errors, log and optional packages: what every other room may use."""

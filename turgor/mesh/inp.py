@@ -39,6 +39,9 @@ FACES = {
 }
 """Corners of the faces S1, S2, … of each kind of cell in Abaqus's count."""
 
+_LONGEST_RANGE = 10_000_000
+"""Of the numbers of a set; no mesh that can be solved has more cells or nodes."""
+
 
 @dataclass
 class _Deck:
@@ -131,10 +134,18 @@ def _add_elements(deck: _Deck, options: dict[str, str], rows: list[list[str]]) -
 
 def _members(options: dict[str, str], rows: list[list[str]], sets: dict[str, list[int]]) -> list[int]:
     if "GENERATE" in options:
-        ranges = ([int(word) for word in row] for row in rows)
-        return [k for first, last, *step in ranges for k in range(first, last + 1, *(step or [1]))]
+        return [number for row in rows for number in _range(row)]
     words = [word for row in rows for word in row]
     return [k for word in words for k in ([int(word)] if word.isdigit() else _set(sets, word.upper()))]
+
+
+def _range(row: list[str]) -> range:
+    first, last, step = [int(word) for word in row] + [1] * (3 - len(row))
+    numbers = range(first, last + 1, max(step, 1))
+    if step < 1 or len(numbers) > _LONGEST_RANGE:
+        expected = f"first, last and a step of 1 or more, at most {_LONGEST_RANGE} numbers"
+        raise InputError("this is no range of numbers", key="GENERATE", value=", ".join(row), expected=expected)
+    return numbers
 
 
 def _corners(deck: _Deck, parts: list[tuple[str, int]], place: dict[int, int]) -> IntArray:

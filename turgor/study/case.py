@@ -6,7 +6,6 @@ resolved ``case.yaml`` of a run's folder, which gives the same run again.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -16,11 +15,11 @@ from pydantic import (
     BeforeValidator,
     Field,
     ValidationError,
-    field_validator,
     model_validator,
 )
 
 from turgor.common.errors import InputError
+from turgor.common.names import Name
 from turgor.common.units import PositiveLength, to_internal
 from turgor.fem.system import System
 from turgor.geometry.imported.mesh_file import MeshFile
@@ -107,10 +106,10 @@ class SolverCase(StrictModel):
 class Draft(Setup):
     """A case that may still lack materials, supports and loads: enough to be meshed. What it says must be right."""
 
-    name: str = Field(default="case", description="the run's name and default folder; left out, the file's name")
+    name: Name = Field(default="case", description="the run's name and default folder; left out, the file's name")
     geometry: Geometry
     materials: dict[str, MaterialChoice] = Field(default={}, description="region of the actuator: its material")
-    regions: dict[str, RegionCase] = Field(default={}, description="further regions by parts of space")
+    regions: dict[Name, RegionCase] = Field(default={}, description="further regions by parts of space")
     mesh: MeshCase = MeshCase()
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
@@ -124,13 +123,6 @@ class Draft(Setup):
     measures: tuple[MeasureChoice, ...] | None = Field(
         default=None, description="left out, the usual ones that the actuator's names allow"
     )
-
-    @field_validator("name")
-    @classmethod
-    def _name_suits_a_folder(cls, name: str) -> str:
-        if not _NAME.fullmatch(name):
-            raise invalid("this cannot be a name", value=name, expected="letters, digits, '-', '_' and '.'")
-        return name
 
     @model_validator(mode="after")
     def _cavities_and_outputs_agree(self) -> Self:
@@ -279,7 +271,6 @@ DEFAULT_STEPS = 10
 BY_LOADS = "control by the loads (control.type: pressure)"
 _FIRST = ("name", "geometry", "materials", "mesh")
 """What a reader of the resolved case looks for first."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 Kind = TypeVar("Kind", bound=Draft)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from itertools import chain, count
 from pathlib import Path
 
 from turgor.results.files import is_same_file
@@ -13,11 +14,12 @@ FOLDER = "data"
 
 def data_names(case: Case) -> dict[Path, str]:
     """Return each data file of the case and the name of its copy, relative to the run's folder."""
-    names: dict[Path, str] = {}
+    names: dict[str, Path] = {}
     for path in case.data_files:
-        name = f"{FOLDER}/{path.name}"
-        names[path] = name if name not in names.values() else f"{FOLDER}/{len(names)}-{path.name}"
-    return names
+        tried = chain([path.name], (f"{k}-{path.name}" for k in count(1)))
+        # In capitals or not: the folder may be carried to a machine that does not tell them apart.
+        names[next(name for name in tried if name.lower() not in {taken.lower() for taken in names})] = path
+    return {path: f"{FOLDER}/{name}" for name, path in names.items()}
 
 
 def copy_data(names: dict[Path, str], folder: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from turgor.common.errors import InputError
+from turgor.common.names import Name
 from turgor.geometry import cad
 from turgor.geometry.actuator import Actuator, FloatArray, Shape
 from turgor.geometry.imported.parts import CadFace, Patch, rims
@@ -34,8 +35,8 @@ class ImportedSolid(Actuator):
     mount: Selection = Field(description="where the actuator is held")
     tip_face: Selection | None = Field(default=None, description="the end whose motion is of interest")
     tip: Place | None = Field(default=None, description="the tip is the vertex of tip_face nearest to this point")
-    surfaces: dict[str, Selection] = Field(default_factory=dict, description="further names of parts of the outside")
-    caps: dict[str, Selection] = Field(
+    surfaces: dict[Name, Selection] = Field(default_factory=dict, description="further names of parts of the outside")
+    caps: dict[Name, Selection] = Field(
         default_factory=dict, description="openings that air does not leave by: name of the cap, rules for the rim"
     )
 

@@ -12,6 +12,7 @@ from pydantic import Field
 from scipy.interpolate import make_lsq_spline
 
 from turgor.common.errors import InputError
+from turgor.common.names import Name
 from turgor.mesh.mesh import Mesh, in_space
 from turgor.results.material_line import along_marker, between_opposite, section_centroids
 from turgor.results.measures.registry import curve, measure
@@ -39,7 +40,7 @@ _Y: Vector = (0.0, 1.0, 0.0)
     surfaces=(MOUNT, TIP_FACE), models=("space", "plane"),
 )  # fmt: skip
 def centreline(
-    state: StoredState, *, stations: Stations = 20, by: By = "sections", across: Vector = _Y, name: str = ""
+    state: StoredState, *, stations: Stations = 20, by: By = "sections", across: Vector = _Y, name: Name | None = None
 ) -> FloatArray:
     """Arc length from the first station, place, curvature κ and torsion τ of each station, mm and 1/mm.
 
@@ -58,7 +59,7 @@ def centreline(
     surfaces=(MOUNT, TIP_FACE), models=("space",),
 )  # fmt: skip
 def coil(
-    state: StoredState, *, stations: Stations = 20, by: By = "sections", across: Vector = _Y, name: str = ""
+    state: StoredState, *, stations: Stations = 20, by: By = "sections", across: Vector = _Y, name: Name | None = None
 ) -> FloatArray:
     """Radius in mm, pitch in mm and number of turns of the helix that fits the centreline best.
 

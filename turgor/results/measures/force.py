@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.common.errors import InputError
+from turgor.common.names import Name
 from turgor.geometry.space import Place
 from turgor.results.measures.registry import measure
 from turgor.results.stored import StoredState
@@ -33,7 +34,7 @@ def tip_force(state: StoredState, *, body: str | None = None) -> float:
     "reaction_{surface}_{name}_torque_z_N_mm",
 )  # fmt: skip
 def reaction(
-    state: StoredState, *, surface: str, about: Place | None = None, name: str = ""
+    state: StoredState, *, surface: str, about: Place | None = None, name: Name | None = None
 ) -> npt.NDArray[np.float64]:
     """Force in N (components, size) and torque in N mm with which the support of a surface holds the body.
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from turgor.common.errors import InputError
+from turgor.common.names import Name
 from turgor.common.units import PositiveLength, from_internal
 from turgor.geometry.space import Place
 from turgor.mesh.mesh import Mesh, in_space
@@ -38,7 +39,7 @@ DataFile = Annotated[Path, BeforeValidator(_file)]
 
 
 @measure(*(f"displacement_{{name}}_{axis}_mm" for axis in "xyz"))
-def displacement(state: StoredState, *, at: Place, name: str = "") -> FloatArray:
+def displacement(state: StoredState, *, at: Place, name: Name | None = None) -> FloatArray:
     """Displacement ``(3,)`` in mm of the material point that lies `at` a place at rest."""
     del name
     return in_space(np.asarray(_shares(state.mesh, (at,)) @ state.displacement)[0])
@@ -46,7 +47,7 @@ def displacement(state: StoredState, *, at: Place, name: str = "") -> FloatArray
 
 @measure("marker_rmse_{name}_percent", surfaces=(MOUNT, TIP_FACE))
 def marker_rmse(
-    state: StoredState, *, file: DataFile, at: Places, length: PositiveLength | None = None, name: str = ""
+    state: StoredState, *, file: DataFile, at: Places, length: PositiveLength | None = None, name: Name | None = None
 ) -> float:
     """Root mean square of the distances between markers and their measured positions, in percent of a length.
 

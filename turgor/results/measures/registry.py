@@ -286,6 +286,9 @@ def _input_error(entry: Measure, error: ValidationError) -> InputError:
     if found["type"] == "missing":
         return InputError("this key is missing", key=key)
     cause = found.get("ctx", {}).get("error")
+    refused = getattr(cause, "__cause__", None)
+    if isinstance(refused, InputError):
+        return InputError(refused.problem, key=key, value=refused.value, expected=refused.expected)
     if cause is not None:
         return InputError(str(cause), key=key)
     return InputError("this value does not fit", key=key, value=found["input"], expected=_words(found["msg"]))
