@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from turgor.fem import kernels
 from turgor.fem.section import Axisymmetric, Section, depth
-from turgor.mesh.cells import Cell, inverses, jacobians
+from turgor.mesh.cells import Cell
 
 Floats = NDArray[np.float64]
 
@@ -38,13 +38,14 @@ def reference_gradients(nodes: Floats, cell: Cell, section: Section | None) -> t
     dV
         ``(m, q)``, mm³.
     """
+    G, dV = np.zeros((len(nodes), len(cell.weights), 3, cell.n_nodes)), np.empty((len(nodes), len(cell.weights)))
+    kernels.reference_gradients(nodes, cell.gradient_at_quadrature, cell.weights, G, dV)
+    if section is None:
+        return G, dV
     places = cell.shape_at_quadrature @ nodes
-    inverse, determinant = inverses(jacobians(nodes, cell))
-    G = np.zeros((*determinant.shape, 3, cell.n_nodes))
-    kernels.turned_gradients(inverse, cell.gradient_at_quadrature, G)
     if isinstance(section, Axisymmetric):
         G[:, :, 2] = cell.shape_at_quadrature / places[:, :, :1]
-    return G, determinant * cell.weights * depth(section, places)
+    return G, dV * depth(section, places)
 
 
 def pressure_modes(nodes: Floats, cell: Cell, dV: Floats) -> Floats:

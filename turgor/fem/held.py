@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from turgor.common.errors import InputError
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import Constraints
+from turgor.fem.incidence import parts
 from turgor.fem.section import Axisymmetric, Section
 from turgor.fem.supports import ElasticSupport, face_normals
 from turgor.mesh.cells import face_cell
@@ -38,7 +37,7 @@ def check_held(
             key="supports",
             expected="supports on a part of the surface, or a finer mesh",
         )
-    count, part = connected_components(_node_graph(mesh), directed=False)
+    count, part = parts(mesh.cells, mesh.n_points)
     nodes, directions = _held_directions(mesh, constraints, springs)
     size = float(np.ptp(mesh.points, axis=0).max())
     for k in range(count):
@@ -73,11 +72,6 @@ def check_rim(cavity: Cavity, constraints: Constraints) -> None:
             key=cavity.name,
             expected="a sliding or clamped support on the body's surface in that plane",
         )
-
-
-def _node_graph(mesh: Mesh) -> sp.csr_matrix:
-    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
-    return sp.csr_matrix((np.ones(len(first), np.int8), (first, mesh.cells.ravel())), shape=(mesh.n_points,) * 2)
 
 
 def _held_directions(

@@ -103,17 +103,26 @@ def displacement_gradient(u, G, H):  # type: ignore[no-untyped-def]
 
 
 @parallel
-def turned_gradients(inverse, gradient, G):  # type: ignore[no-untyped-def]
-    """Fill d rows of ``G (m, q, 3, n)`` with gradients ``(q, n, d)`` times inverse Jacobians ``(m, q, d, d)``."""
-    d = inverse.shape[2]
+def reference_gradients(nodes, gradient, weights, G, dV):  # type: ignore[no-untyped-def]
+    """Fill d rows of ``G (m, q, 3, n)`` and ``dV (m, q)`` from positions ``(m, n, d)`` and ``∂N/∂ξ (q, n, d)``."""
+    d = nodes.shape[2]
     for chunk in nb.prange(CHUNKS):
+        # In the plane a third direction stays as it is.
+        jacobian, inv = np.eye(3), np.empty((3, 3))
         for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
             for q in range(G.shape[1]):
+                for i in range(d):
+                    for j in range(d):
+                        total = 0.0
+                        for a in range(G.shape[3]):
+                            total += nodes[e, a, i] * gradient[q, a, j]
+                        jacobian[i, j] = total
+                dV[e, q] = inverse(jacobian, inv) * weights[q]
                 for i in range(d):
                     for a in range(G.shape[3]):
                         total = 0.0
                         for j in range(d):
-                            total += inverse[e, q, j, i] * gradient[q, a, j]
+                            total += inv[j, i] * gradient[q, a, j]
                         G[e, q, i, a] = total
 
 

@@ -18,6 +18,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from turgor.fem.incidence import Incidence, both_ways, coupled
+from turgor.fem.kernels import CHUNKS
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Longs = NDArray[np.int64]
@@ -81,7 +84,7 @@ class SparsePattern:
         self.free = free
         self.n_free = int(free.sum())
         self._dimension = dimension
-        self._node_start, self._node_column = _node_pattern(n_nodes, [*groups, *couplings])
+        self._node_start, self._node_column = coupled(Incidence.of(n_nodes, [*groups, *couplings]))
         sizes = [len(group) * packed_size(group.shape[1] * dimension) for group in groups]
         self.packed_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         self._groups = groups
@@ -100,6 +103,11 @@ class SparsePattern:
     def n_stored(self) -> int:
         """Number of stored entries."""
         return len(self.column)
+
+    @property
+    def blocks_per_node(self) -> float:
+        """How many blocks of the upper triangle, the diagonal's included, a node has on average."""
+        return len(self._node_column) / (len(self._node_start) - 1)
 
     def sum_blocks(self, packed: Floats, out: Floats) -> None:
         """Add up the `packed` block entries (all groups, one after the other) into the stored values `out`."""
@@ -121,10 +129,9 @@ class SparsePattern:
         Its values are one more than the places of the blocks among those on and above the diagonal, which
         :meth:`sum_into_layout` goes through; negative below it.
         """
-        names = np.arange(1, len(self._node_column) + 1)
-        n = len(self._node_start) - 1
-        upper = sp.csr_matrix((names, self._node_column, self._node_start), shape=(n, n))
-        return sp.csr_matrix(upper - sp.triu(upper, 1).T)
+        start, column, names = both_ways(self._node_start, self._node_column)
+        n = len(start) - 1
+        return sp.csr_matrix((names, column, start), shape=(n, n))
 
     def sum_into_layout(self, packed: Floats, layout: BlockLayout, out: NDArray[np.floating]) -> None:
         """Add up the `packed` block entries of a system in space into blocks, fixed components being identity."""
@@ -147,34 +154,16 @@ class SparsePattern:
     @functools.cached_property
     def _pairs(self) -> tuple[Longs, Ints, Ints]:
         """For each pair of coupled nodes, where the packed entries that add up to it begin, and how they follow."""
-        node_start, node_column = self._node_start, self._node_column
-        pairs = [_find_pairs(group, node_start, node_column) for group in self._groups]
-        start = np.zeros(len(node_column) + 1, np.int64)
-        for found in pairs:
-            start[1:] += np.bincount(found.ravel(), minlength=len(node_column))
+        incidence = Incidence.of(len(self._node_start) - 1, self._groups)
+        where = (*incidence.arrays, self._node_start, self._node_column)
+        start = np.zeros(len(self._node_column) + 1, np.int64)
+        _count_sources(*where, start)
         np.cumsum(start, out=start)
-        at, source, code = start[:-1].copy(), np.empty(start[-1], np.int32), np.empty(start[-1], np.int32)
-        begin = 0
-        for group, found in zip(self._groups, pairs, strict=True):
-            _list_sources(group, found, begin, self._dimension, at, source, code)
-            begin += len(group) * packed_size(group.shape[1] * self._dimension)
+        sizes = [np.full(len(group), packed_size(group.shape[1] * self._dimension)) for group in self._groups]
+        begin = np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64)
+        source, code = np.empty(start[-1], np.int32), np.empty(start[-1], np.int32)
+        _list_sources(*where, begin, self._dimension, start[:-1].copy(), source, code)
         return start, source, code
-
-
-def _node_pattern(n_nodes: int, groups: Sequence[Ints]) -> tuple[NDArray[np.int64], Ints]:
-    # Two nodes are coupled where a block holds both: the nonzeros of AᵀA, A the block-node incidence.
-    incidences = [
-        sp.csr_matrix(
-            (np.ones(group.size, np.float32), group.ravel(), np.arange(0, group.size + 1, group.shape[1])),
-            shape=(len(group), n_nodes),
-        )
-        for group in groups
-        if len(group)
-    ]
-    incidence = sp.vstack([*incidences, sp.csr_matrix((0, n_nodes), dtype=np.float32)], format="csr")
-    coupled = sp.triu(incidence.T @ incidence, format="csr")
-    coupled.sort_indices()
-    return coupled.indptr.astype(np.int64), coupled.indices.astype(np.int32)
 
 
 @nb.njit(cache=True)
@@ -196,53 +185,53 @@ def _number(node_start, node_column, number, d, row_start, column):  # type: ign
     return at
 
 
-@nb.njit(cache=True, parallel=True)
-def _find_pairs(group, node_start, node_column):  # type: ignore[no-untyped-def]
-    """Return the place of each block's pairs of nodes among all coupled pairs, ``(n_blocks, n (n + 1)/2)``."""
-    n = group.shape[1]
-    found = np.empty((len(group), n * (n + 1) // 2), np.int32)
-    for block in nb.prange(len(group)):
-        at = 0
-        for p in range(n):
-            for q in range(p, n):
-                low = min(group[block, p], group[block, q])
-                high = max(group[block, p], group[block, q])
-                first, last = node_start[low], node_start[low + 1] - 1
-                while first < last:
-                    middle = (first + last) // 2
-                    if node_column[middle] < high:
-                        first = middle + 1
-                    else:
-                        last = middle
-                found[block, at] = first
-                at += 1
-    return found
-
-
 UPPER, AS_IT_IS, TRANSPOSED, FOLDED = 0, 1, 2, 3
 """How a pair's entries go into the stored ones: of one node, of an earlier and a later one, of a later and an earlier
 one, and of two places in a block that are the same node."""
 
 
-@nb.njit(cache=True)
-def _list_sources(group, found, begin, dimension, at, source, code):  # type: ignore[no-untyped-def]
+@nb.njit(cache=True, parallel=True)
+def _count_sources(nodes, first, start, place, block, row_start, column, counts):  # type: ignore[no-untyped-def]
+    """Write into ``counts[m + 1]`` how many packed blocks add up to the pair of nodes `m`."""
+    n = len(start) - 1
+    for chunk in nb.prange(CHUNKS):
+        where = np.empty(n, np.int64)
+        for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            for m in range(row_start[a], row_start[a + 1]):
+                where[column[m]] = m
+            for k in place[start[a] : start[a + 1]]:
+                e = block[k]
+                for other in range(first[e], first[e + 1]):
+                    b = nodes[other]
+                    if b > a or (b == a and other >= k):
+                        counts[where[b] + 1] += 1
+
+
+@nb.njit(cache=True, parallel=True)
+def _list_sources(  # type: ignore[no-untyped-def]
+    nodes, first, start, place, block, row_start, column, begin, dimension, at, source, code
+):
     """List where the packed entries of each pair begin, `source`, and how its rows follow each other, `code`."""
-    n = group.shape[1]
-    rows = n * dimension
-    size = rows * (rows + 1) // 2
-    for block in range(len(group)):
-        pair = 0
-        for p in range(n):
-            row = p * dimension
-            diagonal = begin + block * size + row * rows - row * (row - 1) // 2
-            for q in range(p, n):
-                a, b = group[block, p], group[block, q]
-                how = UPPER if p == q else AS_IT_IS if a < b else TRANSPOSED if a > b else FOLDED
-                k = at[found[block, pair]]
-                at[found[block, pair]] += 1
-                source[k] = diagonal + (q - p) * dimension
-                code[k] = 4 * (rows - row) + how
-                pair += 1
+    n = len(start) - 1
+    for chunk in nb.prange(CHUNKS):
+        where = np.empty(n, np.int64)
+        for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            for m in range(row_start[a], row_start[a + 1]):
+                where[column[m]] = m
+            for k in place[start[a] : start[a + 1]]:
+                e = block[k]
+                rows = (first[e + 1] - first[e]) * dimension
+                for other in range(first[e], first[e + 1]):
+                    b = nodes[other]
+                    if b < a or (b == a and other < k):
+                        continue
+                    row = (min(k, other) - first[e]) * dimension
+                    diagonal = begin[e] + row * rows - row * (row - 1) // 2
+                    how = (UPPER if k == other else FOLDED) if a == b else (AS_IT_IS if k < other else TRANSPOSED)
+                    m = where[b]
+                    source[at[m]] = diagonal + abs(other - k) * dimension
+                    code[at[m]] = 4 * (rows - row) + how
+                    at[m] += 1
 
 
 @nb.njit(cache=True)

@@ -89,7 +89,8 @@ class Solid(Mixed):
         self.G, self.dV = reference_gradients(points[self.nodes], self.cell, section)
         self.volume = self.dV.sum(axis=1)
         self._surface = np.linalg.norm(np.einsum("mqsa,mq->msa", self.G, self.dV), axis=(1, 2))
-        self._steepest = np.abs(self.G).sum(axis=3).max(axis=(1, 2))
+        # As a product, for sums over so few numbers each take long.
+        self._steepest = (np.abs(self.G) @ np.ones(self.G.shape[3])).reshape(len(self.G), -1).max(axis=1)
         self.modes = self._modes(points[self.nodes])
         self._share = self.modes * (self.dV / self.volume[:, None])[:, :, None]
         m, q, _, n = self.G.shape

@@ -267,23 +267,6 @@ def determinants(matrices: Floats) -> Floats:
     return np.asarray(np.einsum("...i,...i->...", columns[0], np.cross(columns[1], columns[2])))
 
 
-def inverses(matrices: Floats) -> tuple[Floats, Floats]:
-    """Return the inverses and the determinants of 2 × 2 or 3 × 3 matrices ``(..., d, d)``.
-
-    By cofactors; LAPACK takes far longer for so small ones.
-    """
-    m = np.ascontiguousarray(np.moveaxis(matrices, (-2, -1), (0, 1)))
-    adjugate = np.empty_like(m)
-    if len(m) == 2:
-        adjugate[0, 0], adjugate[0, 1], adjugate[1, 0], adjugate[1, 1] = m[1, 1], -m[0, 1], -m[1, 0], m[0, 0]
-    else:
-        for i, j in np.ndindex(3, 3):
-            p, q, r, s = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-            adjugate[i, j] = m[r, p] * m[s, q] - m[r, q] * m[s, p]
-    determinant = sum(m[0, k] * adjugate[k, 0] for k in range(len(m)))
-    return np.moveaxis(adjugate / determinant, (0, 1), (-2, -1)), np.asarray(determinant)
-
-
 def face_frames(nodes: Floats) -> tuple[Floats, Floats]:
     """Return places and normals (their length is area per reference area) of faces at the quadrature points.
 

@@ -31,11 +31,12 @@ def host_cells(cells: Ints, faces: Ints) -> Ints:
     """
     if faces.size == 0:
         return np.zeros(0, dtype=np.int32)
-    # Of the many faces of all cells few have nothing but nodes of these.
+    # Of the many faces of all cells few have nothing but corners of these.
     marked = np.zeros(max(int(cells.max()), int(faces.max())) + 1, np.bool_)
     marked[faces] = True
     of_cells = all_faces(cells)
-    near = np.flatnonzero(marked[of_cells].all(axis=1))
+    corners = of_cells[:, : face_cell(faces).n_corners].T
+    near = np.flatnonzero(np.logical_and.reduce([marked[nodes] for nodes in corners]))
     own, wanted = _rotated(of_cells[near]), _rotated(faces)
     _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
     owner = np.full(inverse.max() + 1, -1, dtype=np.int32)

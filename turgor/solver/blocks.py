@@ -58,28 +58,21 @@ class BlockMatrix:
     def __init__(self, pattern: SparsePattern) -> None:
         graph = pattern.graph()
         self.order, self._bounds = _portions(graph)
-        self.rank: Ints = np.argsort(self.order).astype(np.int32)
+        self.rank = _inverse(self.order)
         count = len(self._bounds) - 1
         half = (count + 1) // 2
         self._turns = (np.arange(half), np.arange(half, count, 2), np.arange(half + 1, count, 2))
-        ordered = graph[self.order][:, self.order]
-        ordered.sort_indices()
-        n, counts = len(self.order), np.diff(ordered.indptr)
-        self.structure = sp.csr_matrix((np.ones(ordered.nnz, np.int8), ordered.indices, ordered.indptr), ordered.shape)
-        row = np.repeat(np.arange(n, dtype=np.int32), counts)
-        left, on = ordered.indices < row, ordered.indices == row
-        widths = np.bincount(row[left], minlength=n)
+        n = len(self.order)
+        start, column, names = _reordered(graph.indptr, graph.indices, graph.data, self.order, self.rank)
+        self.structure = sp.csr_matrix((np.ones(len(column), np.int8), column, start), shape=(n, n))
+        widths = _earlier(start, column)
         self.start: Longs = np.concatenate([[0], np.cumsum(widths)])
-        self.column: Ints = np.ascontiguousarray(ordered.indices[left], np.int32)
+        self.column: Ints = np.empty(self.start[-1], np.int32)
         self._widest = 3 * int(widths.max())
         begin = 9 * len(self.column)
         self.values: Singles = np.zeros(begin + 9 * n, np.float32)
         self.diagonal: Singles = self.values[begin:].reshape(n, 3, 3)
-        first = self.start[row[left]]
-        place = np.concatenate([9 * first + 3 * (np.arange(len(first)) - first), begin + 9 * np.arange(n)])
-        width = np.concatenate([3 * widths[row[left]], np.full(n, 3)])
-        name = np.concatenate([ordered.data[left], ordered.data[on]])
-        self.layout = _layout(name, place, width)
+        self.layout = _laid_out(start, column, names, self.start, self.column)
         self._inverse = np.empty((n, 3, 3))
         self._replaced = np.zeros(0, np.intp)
 
@@ -122,11 +115,30 @@ class BlockMatrix:
         return excess.ravel()
 
 
-def _layout(name: Longs, place: Longs, width: Longs) -> BlockLayout:
-    """Return how the blocks of pairs stand at places, named as by :meth:`SparsePattern.graph`."""
-    order = np.empty(len(name), np.int64)
-    order[np.abs(name) - 1] = np.arange(len(name))
-    return BlockLayout(place[order], width[order], (name < 0)[order])
+def _inverse(order: Ints) -> Ints:
+    """Return the place of each number in an order of all."""
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    return rank
+
+
+def _reordered(start: Ints, column: Ints, names: Longs, order: Ints, rank: Ints) -> tuple[Ints, Ints, Longs]:
+    """Return the rows of a matrix whose nodes follow in another order, their columns ascending."""
+    new_start = np.concatenate([[0], np.cumsum(np.diff(start)[order])]).astype(np.int32)
+    new_column, new_names = np.empty_like(column), np.empty_like(names)
+    _reorder(start, column, names, order, rank, new_start, new_column, new_names)
+    return new_start, new_column, new_names
+
+
+def _laid_out(start: Ints, column: Ints, names: Longs, left_start: Longs, left: Ints) -> BlockLayout:
+    """Fill `left` with the columns left of the diagonal; return how the blocks of pairs stand.
+
+    They are named as by :meth:`SparsePattern.graph`.
+    """
+    n_pairs = (len(column) + len(start) - 1) // 2
+    place, width, turned = np.empty(n_pairs, np.int64), np.full(n_pairs, 3), np.empty(n_pairs, np.bool_)
+    _lay_out(start, column, names, left_start, left, place, width, turned)
+    return BlockLayout(place, width, turned)
 
 
 def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
@@ -134,7 +146,7 @@ def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
     structure = sp.csr_matrix((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), shape=graph.shape)
     near = scipy.sparse.csgraph.reverse_cuthill_mckee(structure, symmetric_mode=True).astype(np.int32)
     n = len(near)
-    rank = np.argsort(near).astype(np.int32)
+    rank = _inverse(near)
     bandwidth = int(np.abs(np.repeat(rank, np.diff(graph.indptr)) - rank[graph.indices]).max())
     count = max(1, min(PORTIONS, n // (bandwidth + 1)))
     cuts = np.linspace(0, n, count + 1).astype(np.int64)
@@ -143,6 +155,41 @@ def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
     colour = _coloured(graph.indptr, graph.indices, near)
     bounds = np.concatenate([[0], np.cumsum(np.concatenate([sizes[::2], sizes[1::2]]))])
     return near[np.lexsort((colour[near], portion, portion % 2))], bounds
+
+
+@nb.njit(cache=True)
+def _reorder(start, column, names, order, rank, new_start, new_column, new_names):  # type: ignore[no-untyped-def]
+    """Write each row into the columns, in whose rows its numbers then ascend: which nodes are coupled is symmetric."""
+    at = new_start[:-1].copy()
+    for a in range(len(order)):
+        for k in range(start[order[a]], start[order[a] + 1]):
+            b = rank[column[k]]
+            new_column[at[b]], new_names[at[b]] = a, names[k] if a == b else -names[k]
+            at[b] += 1
+
+
+@nb.njit(cache=True)
+def _earlier(start, column):  # type: ignore[no-untyped-def]
+    """Return how many columns of each row are left of the diagonal."""
+    counts = np.zeros(len(start) - 1, np.int64)
+    for a in range(len(counts)):
+        counts[a] = np.searchsorted(column[start[a] : start[a + 1]], a)
+    return counts
+
+
+@nb.njit(cache=True)
+def _lay_out(start, column, names, left_start, left, place, width, turned):  # type: ignore[no-untyped-def]
+    for a in range(len(start) - 1):
+        count = left_start[a + 1] - left_start[a]
+        for k in range(count + 1):
+            name = names[start[a] + k]
+            pair = abs(name) - 1
+            turned[pair] = name < 0
+            if k < count:
+                left[left_start[a] + k] = column[start[a] + k]
+                place[pair], width[pair] = 9 * left_start[a] + 3 * k, 3 * count
+            else:
+                place[pair] = 9 * (len(left) + a)
 
 
 @nb.njit(cache=True)

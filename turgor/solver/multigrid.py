@@ -118,22 +118,37 @@ def _upper(
 
     And for each of its entries the place of its mirror image, and whether it couples free components.
     """
-    count = np.diff(start)
-    row = np.repeat(np.arange(len(count)), count)
-    block = np.arange(len(column)) - start[row]
-    mirror = sp.csr_matrix((np.arange(len(column)), column, start), shape=(len(count),) * 2).T.tocsr().data
-    i, k = np.arange(3)[:, None], np.arange(3)
-    places = (9 * start[row] + 3 * block)[:, None, None] + 3 * i * count[row][:, None, None] + k
-    rows, columns = np.broadcast_arrays(3 * row[:, None, None] + i, 3 * column[:, None, None] + k)
-    above = columns >= rows
-    n = 3 * len(count)
-    upper = sp.csr_matrix((np.flatnonzero(above), (rows[above], columns[above])), shape=(n, n))
-    upper.sort_indices()
-    upper.indptr, upper.indices = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
-    mirrored = places[mirror].swapaxes(1, 2).ravel()[upper.data]
-    upper.data = places.ravel()[upper.data]
+    n = len(start) - 1
+    row_start = np.empty(3 * n + 1, np.int32)
+    size = 9 * (len(column) - n) // 2 + 6 * n
+    columns, places, mirrored = np.empty(size, np.int32), np.empty(size, np.int64), np.empty(size, np.int64)
+    _list_upper(start, column, row_start, columns, places, mirrored)
     is_free = free.ravel()
-    return upper, mirrored, np.repeat(is_free, np.diff(upper.indptr)) & is_free[upper.indices]
+    upper = sp.csr_matrix((places, columns, row_start), shape=(3 * n, 3 * n))
+    return upper, mirrored, np.repeat(is_free, np.diff(row_start)) & is_free[columns]
+
+
+@nb.njit(cache=True)
+def _list_upper(start, column, row_start, columns, places, mirrored):  # type: ignore[no-untyped-def]
+    n, at = len(start) - 1, 0
+    # Rows come one after the other, and meet the blocks of a later one in its order.
+    met = start[:-1].copy()
+    for a in range(n):
+        first, count = start[a], start[a + 1] - start[a]
+        on = first + np.searchsorted(column[first : first + count], a)
+        for i in range(3):
+            row_start[3 * a + i] = at
+            for m in range(on, first + count):
+                b = column[m]
+                its_count = start[b + 1] - start[b]
+                for k in range(i if b == a else 0, 3):
+                    columns[at] = 3 * b + k
+                    places[at] = 9 * first + 3 * (m - first) + 3 * i * count + k
+                    mirrored[at] = 9 * start[b] + 3 * (met[b] - start[b]) + 3 * k * its_count + i
+                    at += 1
+        for m in range(on, first + count):
+            met[column[m]] += 1
+    row_start[3 * n] = at
 
 
 @parallel

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from turgor.fem.contact.partners import FACING, balls
+from turgor.fem.incidence import parts
 from turgor.fem.section import Section, depth
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.cells import CELLS, Cell, Rule, face_areas, face_cell, jacobians
@@ -101,7 +100,7 @@ class Skin:
         nodes = mesh.points[self.faces]
         self.area = _measures(nodes, cell) * cell.weights * depth(section, cell.shape_at_quadrature @ nodes)
         centre_of_face, *_ = balls(self.points, self.faces)
-        part_of_node = _parts(mesh)
+        part_of_node = parts(mesh.cells, mesh.n_points)[1]
         self.part = part_of_node[self.faces[:, 0]]
         plain = face_areas(mesh.points[self.faces])
         extent = (plain / cell.weights.sum()) ** (1.0 / cell.dimension)
@@ -194,10 +193,3 @@ def _measures(nodes: Floats, cell: Cell) -> Floats:
     if cell.dimension == 1:
         return np.asarray(np.linalg.norm(tangents[..., 0], axis=2))
     return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=2))
-
-
-def _parts(mesh: Mesh) -> Ints:
-    """Return for each node the number of the connected body that it belongs to, ``(n_points,)``."""
-    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
-    graph = sp.csr_matrix((np.ones(len(first), np.int8), (first, mesh.cells.ravel())), shape=(mesh.n_points,) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
