@@ -17,7 +17,7 @@ from turgor.mesh.structured import box
 from turgor.solver import coarse, iterative
 from turgor.solver.blocks import BlockMatrix
 from turgor.solver.iterative import AUGMENTATION, Iterative
-from turgor.solver.krylov import gmres, softest
+from turgor.solver.krylov import Room, gmres, softest
 from turgor.solver.linear import LinearSolver, make_linear_solver
 from turgor.solver.multigrid import TwoLevels, corner_interpolation
 from turgor.solver.newton import NewtonOptions, find_equilibrium
@@ -269,11 +269,11 @@ def test_the_softest_direction():
     frame = np.linalg.qr(rng.standard_normal((90, 90)))[0]
     values = np.concatenate([[1e-3], np.linspace(0.2, 1.0, 89)])
     matrix = frame @ np.diag(values) @ frame.T
-    direction, energy = softest(improving(matrix, np.eye(90)), 90, 60)
+    direction, energy = softest(improving(matrix, np.eye(90)), 90, 60, Room())
     assert energy == pytest.approx(direction @ matrix @ direction)
     assert abs(direction @ frame[:, 0]) == pytest.approx(np.linalg.norm(direction), rel=1e-3)
-    assert softest(improving(matrix, np.eye(90)), 90, 4) is None
-    assert softest(improving(matrix - 0.002 * np.eye(90), np.eye(90)), 90, 60) is None
+    assert softest(improving(matrix, np.eye(90)), 90, 4, Room()) is None
+    assert softest(improving(matrix - 0.002 * np.eye(90), np.eye(90)), 90, 60, Room()) is None
 
 
 def test_gmres():
@@ -282,13 +282,13 @@ def test_gmres():
     right = rng.standard_normal(90)
     exact = np.linalg.solve(matrix, right)
     for inverse in (np.eye(90), np.diag(1.0 / np.diag(matrix))):
-        found, iterations, converged = gmres(improving(matrix, inverse), right, 1e-8, 400)
+        found, iterations, converged = gmres(improving(matrix, inverse), right, 1e-8, 400, Room())
         assert converged
         assert 10 < iterations < 200
         np.testing.assert_allclose(found, exact, atol=1e-5)
-    *_, converged = gmres(improving(matrix, np.eye(90)), right, 1e-8, 5)
+    *_, converged = gmres(improving(matrix, np.eye(90)), right, 1e-8, 5, Room())
     assert not converged
-    found, iterations, converged = gmres(improving(matrix, np.eye(90)), np.zeros(90), 1e-8, 5)
+    found, iterations, converged = gmres(improving(matrix, np.eye(90)), np.zeros(90), 1e-8, 5, Room())
     assert converged
     assert iterations == 0
     assert not found.any()

@@ -24,7 +24,7 @@ from turgor.common.log import logger
 from turgor.fem.pattern import SparsePattern
 from turgor.fem.state import State
 from turgor.fem.system import System
-from turgor.solver.krylov import gmres, softest
+from turgor.solver.krylov import Room, gmres, softest
 from turgor.solver.linear import LinearSolver, factors_fit, make_linear_solver
 from turgor.solver.multigrid import TwoLevels
 from turgor.solver.pressures import Pressures
@@ -84,6 +84,7 @@ class Iterative(StiffnessSolver):
         # Of each free component, in the order of the rows, its number among the unknowns.
         number = np.cumsum(system.pattern.free, dtype=np.int32).reshape(-1, 3)[fine.order] - 1
         self._number: Ints = number[self._levels.free]
+        self._room = Room()
         self._direct: LinearSolver | None = None
         self._factorised = False
         self._failures = 0
@@ -142,7 +143,7 @@ class Iterative(StiffnessSolver):
 
     def _is_definite(self) -> bool:
         """Whether A is seen to be positive definite, also in double precision where it is softest."""
-        found = softest(self._levels.apply, 3 * len(self._levels.free), MOST_FOR_INERTIA)
+        found = softest(self._levels.apply, 3 * len(self._levels.free), MOST_FOR_INERTIA, self._room)
         if found is None:
             return False
         direction, energy = found
@@ -197,8 +198,8 @@ class Iterative(StiffnessSolver):
         count = 0
         while True:
             size = float(np.linalg.norm(residual))
-            most = MOST_ITERATIONS - count
-            change, iterations, converged = gmres(self._precondition, residual, max(goal / size, FORCING), most)
+            most, reached = MOST_ITERATIONS - count, max(goal / size, FORCING)
+            change, iterations, converged = gmres(self._precondition, residual, reached, most, self._room)
             count += iterations
             x = x + change
             if not converged or (accuracy >= FORCING and self._meets_volumes(problem, x)):

@@ -34,7 +34,26 @@ CANCELLED = 0.7
 (Daniel et al. 1976)."""
 
 
-def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: int) -> tuple[Floats, int, bool]:
+class Room:
+    """Memory for the directions of Krylov spaces, one space at a time.
+
+    Kept, as the system takes long to hand out as much of it anew for each linear problem; what is not written to takes
+    none.
+    """
+
+    def __init__(self) -> None:
+        self._floats = np.empty(0)
+
+    def rows(self, count: int, n: int) -> Floats:
+        """Return rows ``(count, n)`` with whatever was left in them."""
+        if len(self._floats) < count * n:
+            self._floats = np.empty(count * n)
+        return self._floats[: count * n].reshape(count, n)
+
+
+def gmres(
+    preconditioner: Preconditioner, right: Floats, accuracy: float, most: int, room: Room
+) -> tuple[Floats, int, bool]:
     """Solve a linear system of any symmetry or sign, from zero.
 
     Parameters
@@ -47,6 +66,8 @@ def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: 
         Part of it (its norm) that the solution may leave.
     most
         Iterations allowed.
+    room
+        Where the directions are kept meanwhile.
 
     Returns
     -------
@@ -56,7 +77,7 @@ def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: 
     solution, residual, done = np.zeros_like(right), right, 0
     goal = accuracy * _length(right)
     while _length(residual) > goal and done < most:
-        change, product, steps = _cycle(preconditioner, residual, goal, min(RESTART, most - done))
+        change, product, steps = _cycle(preconditioner, residual, goal, min(RESTART, most - done), room)
         solution, done = solution + change, done + steps
         before, residual = _length(residual), residual - product
         if not _length(residual) < before:
@@ -64,7 +85,7 @@ def gmres(preconditioner: Preconditioner, right: Floats, accuracy: float, most: 
     return solution, done, _length(residual) <= goal
 
 
-def softest(preconditioner: Preconditioner, n: int, most: int) -> tuple[Floats, float] | None:
+def softest(preconditioner: Preconditioner, n: int, most: int, room: Room) -> tuple[Floats, float] | None:
     """Find the direction in which a symmetric positive definite matrix is softest, by a random vector's Krylov space.
 
     It belongs to the least eigenvalue of the preconditioned matrix (Arnoldi's method; Saad 2011, sec. 6.2). A
@@ -79,6 +100,8 @@ def softest(preconditioner: Preconditioner, n: int, most: int) -> tuple[Floats, 
         Number of unknowns.
     most
         Iterations allowed.
+    room
+        Where the directions are kept meanwhile.
 
     Returns
     -------
@@ -87,7 +110,7 @@ def softest(preconditioner: Preconditioner, n: int, most: int) -> tuple[Floats, 
         energy, or none is found to be the softest.
     """
     start = np.random.default_rng(0).standard_normal(n)
-    space = _Krylov(preconditioner, start / _length(start), most)
+    space = _Krylov(preconditioner, start / _length(start), most, room)
     for k in range(1, most + 1):
         left = float(space.grow()[-1])
         if k < ENOUGH:
@@ -118,10 +141,10 @@ class _Krylov:
         The matrix times the improved ones in terms of the basis, ``(most + 1, most)``.
     """
 
-    def __init__(self, preconditioner: Preconditioner, first: Floats, most: int) -> None:
+    def __init__(self, preconditioner: Preconditioner, first: Floats, most: int, room: Room) -> None:
         self._preconditioner = preconditioner
-        # What is not written to takes no memory.
-        self.basis, self.improved = np.empty((most + 1, len(first))), np.empty((most, len(first)))
+        rows = room.rows(2 * most + 1, len(first))
+        self.basis, self.improved = rows[: most + 1], rows[most + 1 :]
         self.basis[0] = first
         self.columns = np.zeros((most + 1, most))
         self._size = 0
@@ -137,13 +160,15 @@ class _Krylov:
         return column
 
 
-def _cycle(preconditioner: Preconditioner, residual: Floats, goal: float, most: int) -> tuple[Floats, Floats, int]:
+def _cycle(
+    preconditioner: Preconditioner, residual: Floats, goal: float, most: int, room: Room
+) -> tuple[Floats, Floats, int]:
     """Lessen the residual to `goal`, or as far as `most` directions reach.
 
     Returns the change, the product of the matrix with it, and how many directions were taken.
     """
     size = _length(residual)
-    space = _Krylov(preconditioner, residual / size, most)
+    space = _Krylov(preconditioner, residual / size, most, room)
     triangle = np.zeros((most, most))
     rotations: list[tuple[float, float]] = []
     target = [size]
