@@ -1,4 +1,4 @@
-"""Names that users give to parts and results: they become names of files and of sets in decks."""
+"""Names that users give to parts and results, which become names of files and of sets in decks; names of loads."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ def _checked(name: str) -> str:
         raise ValueError(str(error)) from error
     return name
 
+
+PRESSURE_PREFIX = "pressure:"
+"""A load ``pressure:<cavity>`` is the pressure in that cavity in MPa; other loads are dimensionless factors."""
 
 Name = Annotated[str, AfterValidator(_checked)]
 """A key or parameter of a case that names something new."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError
+from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.bending import FibreBending
 from turgor.fem.cavity import Cavity
@@ -467,7 +468,7 @@ def _load_names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:
     names: list[str] = []
     for load in loads:
         if isinstance(load, Pressure):
-            name = f"pressure:{load.cavity}"
+            name = PRESSURE_PREFIX + load.cavity
         elif isinstance(load, Gravity):
             name = "gravity"
         elif isinstance(load, RigidContact):

@@ -8,15 +8,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from turgor.common.names import PRESSURE_PREFIX
 from turgor.common.units import from_internal
 from turgor.results.archive import Row
 from turgor.results.measures import Choice, evaluate
 from turgor.results.measures.motion import max_displacement
 from turgor.results.record import SOLVER_FACTS
 from turgor.results.stored import StoredState
-
-PRESSURE_PREFIX = "pressure:"
-"""A load ``pressure:<cavity>`` is the pressure in that cavity in MPa; other loads are dimensionless factors."""
 
 
 def row(state: StoredState, measures: Iterable[Choice]) -> Row:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turgor.common.errors import SolverError
+from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.loads import Pressure
 from turgor.fem.surface import surface_stretches
@@ -149,7 +150,11 @@ def load_facts(system: System, here: Equilibrium) -> Facts:
 
 def load_text(facts: Facts) -> str:
     """Return the pressures among the facts of :func:`load_facts` in words."""
-    pressures = [f"{value:.4g} kPa in {name[9:-4]}" for name, value in facts.items() if name.startswith("pressure:")]
+    pressures = [
+        f"{value:.4g} kPa in {name.removeprefix(PRESSURE_PREFIX).removesuffix('_kPa')}"
+        for name, value in facts.items()
+        if name.startswith(PRESSURE_PREFIX)
+    ]
     return ", ".join(pressures) or f"{facts['last_fraction']:.4g} of the load"
 
 

@@ -15,12 +15,12 @@ from typing import Any
 from turgor.common.compiled import kernels_are_kept
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
+from turgor.common.names import PRESSURE_PREFIX
 from turgor.common.units import from_internal
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
 from turgor.results.files import UnwritableError
-from turgor.results.history import PRESSURE_PREFIX
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from turgor.common.errors import InputError
-from turgor.common.names import Name
+from turgor.common.names import PRESSURE_PREFIX, Name
 from turgor.common.units import PositiveLength, from_internal
 from turgor.geometry.space import Place
 from turgor.mesh.mesh import Mesh, in_space
@@ -77,7 +77,8 @@ def marker_rmse(
             expected="one place for each marker",
         )
     shares = _shares(state.mesh, at)
-    pressure = max((p for name, p in state.record.loads.items() if name.startswith("pressure:")), key=abs, default=0.0)
+    pressures = (p for name, p in state.record.loads.items() if name.startswith(PRESSURE_PREFIX))
+    pressure = max(pressures, key=abs, default=0.0)
     measured = table.at(from_internal(pressure, "pressure"))
     if measured is None:
         return math.nan
