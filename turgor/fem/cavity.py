@@ -68,9 +68,7 @@ class AirPressure(Unlagged):
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill −p ∂²V/∂u², N/mm."""
         del lagged
-        hessian = self._enclosed.hessian(self._places(state.u))
-        hessian *= -state.loads[self.channel]
-        pack_symmetric(hessian, out)
+        pack_symmetric(self._enclosed.hessian(self._places(state.u)), out, -state.loads[self.channel])
 
     def _places(self, u: Floats) -> Floats:
         """Return where the nodes are; what comes behind them in `u` are rigid bodies."""

@@ -6,6 +6,7 @@ is linearised and the quadrature is exact, force and stiffness of a pressure in 
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Protocol
 
@@ -44,7 +45,7 @@ class EnclosedVolume(Protocol):
         ...
 
     def hessian(self, x: Floats) -> Floats:
-        """Return the second derivatives of each face's share, ``(k, n d, n d)``, mm."""
+        """Return the second derivatives of each face's share, ``(k, n d, n d)``, mm; good until the next call."""
         ...
 
 
@@ -71,10 +72,13 @@ class FaceVolume:
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 3 n, 3 n)``."""
+        _hessians(x - self._origin, self.nodes, *self._rule, self._hessian)
+        return self._hessian
+
+    @functools.cached_property
+    def _hessian(self) -> Floats:
         n_dofs = 3 * self.nodes.shape[1]
-        out = np.empty((len(self.nodes), n_dofs, n_dofs))
-        _hessians(x - self._origin, self.nodes, *self._rule, out)
-        return out
+        return np.empty((len(self.nodes), n_dofs, n_dofs))
 
 
 class CapVolume:

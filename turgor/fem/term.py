@@ -5,9 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Protocol
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.kernels import parallel
 from turgor.fem.state import State
 
 Floats = NDArray[np.float64]
@@ -148,10 +150,20 @@ def add_at_nodes(nodes: Ints, values: Floats, out: Floats) -> None:
         out[:, i] += np.bincount(flat, values[:, :, i].ravel(), minlength=len(out))
 
 
-def pack_symmetric(blocks: Floats, out: Floats) -> None:
-    """Write the upper triangles of ``blocks (n_blocks, n, n)`` into ``out (n_blocks, packed)``."""
-    row, col = np.triu_indices(blocks.shape[-1])
-    out[:] = blocks[..., row, col]
+def pack_symmetric(blocks: Floats, out: Floats, factor: float = 1.0) -> None:
+    """Write the upper triangles of ``blocks (n_blocks, n, n)``, times a factor, into ``out (n_blocks, packed)``."""
+    _pack(np.ascontiguousarray(blocks), factor, out)
+
+
+@parallel
+def _pack(blocks, factor, out):  # type: ignore[no-untyped-def]
+    n = blocks.shape[1]
+    for block in nb.prange(len(blocks)):
+        at = 0
+        for row in range(n):
+            for column in range(row, n):
+                out[block, at] = factor * blocks[block, row, column]
+                at += 1
 
 
 def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Triple]:
