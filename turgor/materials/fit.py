@@ -221,17 +221,17 @@ def _judged(
     constrained: bool,
 ) -> Fit:
     """Turn constants into a fit with its numbers and verdicts."""
-    parameters = _named(kind, solution)
     remark = ""
     material: Hyperelastic | None = None
     try:
-        material = fit_bulk_modulus(kind.of(parameters), volumetric)
+        found = fit_bulk_modulus(kind.of(_named(kind, solution)), volumetric)
         if any(test.lateral is not None for test in problem.counted):
-            material, solution = fit_compressible(material, problem, in_proportion=constrained)
-            parameters = _named(kind, solution)
-            remark = f"compressible, fitted to the lateral strain: Poisson's ratio {material.poisson_ratio:.4g}"
+            found, solution = fit_compressible(found, problem, in_proportion=constrained)
+            remark = f"compressible, fitted to the lateral strain: Poisson's ratio {found.poisson_ratio:.4g}"
+        material = found
     except InputError as wrong:
         remark = str(wrong)
+    parameters = _named(kind, solution)
     counts = problem.weights > 0
     residual, stress = solution.residual[counts], problem.stress[counts]
     squares = float(residual @ residual)
