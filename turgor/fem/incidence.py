@@ -65,11 +65,11 @@ def coupled(incidence: Incidence) -> tuple[Longs, Ints]:
     left without any.
     """
     n = len(incidence.start) - 1
-    start = np.zeros(n + 1, np.int64)
-    _count_later(*incidence.arrays, start)
+    start, column = np.zeros(n + 1, np.int64), np.empty(0, np.int32)
+    _list_later(*incidence.arrays, start[1:], column)
     np.cumsum(start, out=start)
     column = np.empty(start[-1], np.int32)
-    _list_later(*incidence.arrays, start, column)
+    _list_later(*incidence.arrays, start[:-1].copy(), column)
     # To columns and back to rows: that sorts them.
     upper = sp.csr_matrix((np.ones(len(column), np.int8), column, start), shape=(n, n)).tocsc().tocsr()
     return start, np.asarray(upper.indices, np.int32)
@@ -81,10 +81,11 @@ def both_ways(start: Longs, column: Ints) -> tuple[Longs, Ints, Longs]:
     A name is one more than the place of the entry in the triangle; negative below the diagonal.
     """
     full = np.zeros_like(start)
-    _count_both_ways(start, column, full)
+    columns, names = np.empty(0, np.int32), np.empty(0, np.int64)
+    _list_both_ways(start, column, full[1:], columns, names)
     np.cumsum(full, out=full)
     columns, names = np.empty(full[-1], np.int32), np.empty(full[-1], np.int64)
-    _list_both_ways(start, column, full, columns, names)
+    _list_both_ways(start, column, full[:-1].copy(), columns, names)
     return full, columns, names
 
 
@@ -112,58 +113,38 @@ def _places(n_nodes, nodes):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, parallel=True)
-def _count_later(nodes, first, start, place, block, counts):  # type: ignore[no-untyped-def]
-    """Write into ``counts[a + 1]`` how many nodes, itself and later ones, share a block with `a`."""
+def _list_later(nodes, first, start, place, block, at, column):  # type: ignore[no-untyped-def]
+    """List the nodes, itself and later ones, that share a block with each node, from ``at[a]`` on, which moves on.
+
+    With room for none they are only counted.
+    """
     n = len(start) - 1
     for chunk in nb.prange(CHUNKS):
         seen = np.full(n, -1, np.int32)
         for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            count = 0
             for k in place[start[a] : start[a + 1]]:
                 e = block[k]
                 for b in nodes[first[e] : first[e + 1]]:
                     if b >= a and seen[b] != a:
                         seen[b] = a
-                        count += 1
-            counts[a + 1] = count
-
-
-@nb.njit(cache=True, parallel=True)
-def _list_later(nodes, first, start, place, block, row_start, column):  # type: ignore[no-untyped-def]
-    n = len(start) - 1
-    for chunk in nb.prange(CHUNKS):
-        seen = np.full(n, -1, np.int32)
-        for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            at = row_start[a]
-            for k in place[start[a] : start[a + 1]]:
-                e = block[k]
-                for b in nodes[first[e] : first[e + 1]]:
-                    if b >= a and seen[b] != a:
-                        seen[b] = a
-                        column[at] = b
-                        at += 1
+                        if len(column):
+                            column[at[a]] = b
+                        at[a] += 1
 
 
 @nb.njit(cache=True)
-def _count_both_ways(start, column, counts):  # type: ignore[no-untyped-def]
-    for a in range(len(start) - 1):
-        for m in range(start[a], start[a + 1]):
-            counts[a + 1] += 1
-            if column[m] != a:
-                counts[column[m] + 1] += 1
-
-
-@nb.njit(cache=True)
-def _list_both_ways(start, column, full, columns, names):  # type: ignore[no-untyped-def]
-    at = full[:-1].copy()
+def _list_both_ways(start, column, at, columns, names):  # type: ignore[no-untyped-def]
+    """List the entries of each row and their names from ``at[a]`` on, which moves on; only count them without room."""
     # Rows come one after the other, so that what is left of a diagonal is there, ascending, before the rest.
     for a in range(len(start) - 1):
         for m in range(start[a], start[a + 1]):
             b = column[m]
-            columns[at[a]], names[at[a]] = b, m + 1
+            if len(columns):
+                columns[at[a]], names[at[a]] = b, m + 1
             at[a] += 1
             if b != a:
-                columns[at[b]], names[at[b]] = a, -(m + 1)
+                if len(columns):
+                    columns[at[b]], names[at[b]] = a, -(m + 1)
                 at[b] += 1
 
 

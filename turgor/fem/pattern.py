@@ -156,11 +156,11 @@ class SparsePattern:
         """For each pair of coupled nodes, where the packed entries that add up to it begin, and how they follow."""
         incidence = Incidence.of(len(self._node_start) - 1, self._groups)
         where = (*incidence.arrays, self._node_start, self._node_column)
-        start = np.zeros(len(self._node_column) + 1, np.int64)
-        _count_sources(*where, start)
-        np.cumsum(start, out=start)
         sizes = [np.full(len(group), packed_size(group.shape[1] * self._dimension)) for group in self._groups]
         begin = np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64)
+        start, none = np.zeros(len(self._node_column) + 1, np.int64), np.empty(0, np.int32)
+        _list_sources(*where, begin, self._dimension, start[1:], none, none)
+        np.cumsum(start, out=start)
         source, code = np.empty(start[-1], np.int32), np.empty(start[-1], np.int32)
         _list_sources(*where, begin, self._dimension, start[:-1].copy(), source, code)
         return start, source, code
@@ -191,27 +191,13 @@ one, and of two places in a block that are the same node."""
 
 
 @nb.njit(cache=True, parallel=True)
-def _count_sources(nodes, first, start, place, block, row_start, column, counts):  # type: ignore[no-untyped-def]
-    """Write into ``counts[m + 1]`` how many packed blocks add up to the pair of nodes `m`."""
-    n = len(start) - 1
-    for chunk in nb.prange(CHUNKS):
-        where = np.empty(n, np.int64)
-        for a in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            for m in range(row_start[a], row_start[a + 1]):
-                where[column[m]] = m
-            for k in place[start[a] : start[a + 1]]:
-                e = block[k]
-                for other in range(first[e], first[e + 1]):
-                    b = nodes[other]
-                    if b > a or (b == a and other >= k):
-                        counts[where[b] + 1] += 1
-
-
-@nb.njit(cache=True, parallel=True)
 def _list_sources(  # type: ignore[no-untyped-def]
     nodes, first, start, place, block, row_start, column, begin, dimension, at, source, code
 ):
-    """List where the packed entries of each pair begin, `source`, and how its rows follow each other, `code`."""
+    """List where the packed entries of each pair begin, `source`, and how its rows follow each other, `code`.
+
+    From ``at[m]`` on, which moves on; without room they are only counted.
+    """
     n = len(start) - 1
     for chunk in nb.prange(CHUNKS):
         where = np.empty(n, np.int64)
@@ -225,12 +211,13 @@ def _list_sources(  # type: ignore[no-untyped-def]
                     b = nodes[other]
                     if b < a or (b == a and other < k):
                         continue
-                    row = (min(k, other) - first[e]) * dimension
-                    diagonal = begin[e] + row * rows - row * (row - 1) // 2
-                    how = (UPPER if k == other else FOLDED) if a == b else (AS_IT_IS if k < other else TRANSPOSED)
                     m = where[b]
-                    source[at[m]] = diagonal + abs(other - k) * dimension
-                    code[at[m]] = 4 * (rows - row) + how
+                    if len(source):
+                        row = (min(k, other) - first[e]) * dimension
+                        diagonal = begin[e] + row * rows - row * (row - 1) // 2
+                        how = (UPPER if k == other else FOLDED) if a == b else (AS_IT_IS if k < other else TRANSPOSED)
+                        source[at[m]] = diagonal + abs(other - k) * dimension
+                        code[at[m]] = 4 * (rows - row) + how
                     at[m] += 1
 
 

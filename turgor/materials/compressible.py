@@ -12,15 +12,12 @@ from scipy.optimize import least_squares
 from turgor.common.errors import InputError
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.kinematics import Array
-from turgor.materials.least_squares import Problem, Solution, bounds_of, central_difference, predict
+from turgor.materials.least_squares import FAR, Problem, Solution, bounds_of, central_difference, predict
 from turgor.materials.measurement import MaterialTest
 
 _ITERATIONS = 60
 _STARTS = (1.5, 5.0, 50.0)
 """Ratios of bulk to shear modulus from which compressible fits are searched."""
-
-_FAR = 1e3
-"""Residual of a trial that has no finite stress."""
 
 _TRANSVERSE = {"uniaxial": (1, 2), "equibiaxial": (2,), "planar": (2,)}
 """The directions in which each mode is free to contract."""
@@ -180,7 +177,7 @@ def _least(residual: Callable[[Array], Array], start: Array, bounds: tuple[Array
 
 
 def _finite(residual: Array) -> Array:
-    return np.nan_to_num(residual, nan=_FAR, posinf=_FAR, neginf=-_FAR)
+    return np.nan_to_num(residual, nan=FAR, posinf=FAR, neginf=-FAR)
 
 
 def _response(material: Hyperelastic, test: MaterialTest) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ RELATIVE_FLOOR = 0.02
 """With relative error, stresses below so much of a test's largest are weighted as if they were that large."""
 
 _TINY = 1e-300
-_FAR = 1e3
+FAR = 1e3
 """Residual of a trial that has no finite stress or keeps no limit, relative to the measured stress."""
 
 
@@ -165,7 +165,7 @@ def solve(model: type[Hyperelastic], problem: Problem, limits: Limits | None = N
     linear = _Linear(model, problem, limits)
     best = _search(model, linear) if linear.searched else np.zeros(0)
     moduli, relative = linear.solve(best)
-    if relative[0] == _FAR:
+    if relative[0] == FAR:
         return None
     values = linear.assemble(moduli, best)
     residual = linear.prediction(values) - linear.stress
@@ -232,7 +232,7 @@ class _Linear:
         y = self.weights * self.stress / self.scale
         A = self.columns(searched) * (self.weights / self.scale)[:, None]
         norms = np.maximum(np.linalg.norm(A, axis=0), _TINY)
-        far = np.zeros(len(self.moduli)), np.full_like(y, _FAR)
+        far = np.zeros(len(self.moduli)), np.full_like(y, FAR)
         if not np.all(np.isfinite(norms)):
             return far
         scaled = A / norms

@@ -58,7 +58,7 @@ class BlockMatrix:
     def __init__(self, pattern: SparsePattern) -> None:
         graph = pattern.graph()
         self.order, self._bounds = _portions(graph)
-        self.rank = _inverse(self.order)
+        self.rank = _ranks(self.order)
         count = len(self._bounds) - 1
         half = (count + 1) // 2
         self._turns = (np.arange(half), np.arange(half, count, 2), np.arange(half + 1, count, 2))
@@ -115,7 +115,7 @@ class BlockMatrix:
         return excess.ravel()
 
 
-def _inverse(order: Ints) -> Ints:
+def _ranks(order: Ints) -> Ints:
     """Return the place of each number in an order of all."""
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
@@ -146,7 +146,7 @@ def _portions(graph: sp.csr_matrix) -> tuple[Ints, Longs]:
     structure = sp.csr_matrix((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), shape=graph.shape)
     near = scipy.sparse.csgraph.reverse_cuthill_mckee(structure, symmetric_mode=True).astype(np.int32)
     n = len(near)
-    rank = _inverse(near)
+    rank = _ranks(near)
     bandwidth = int(np.abs(np.repeat(rank, np.diff(graph.indptr)) - rank[graph.indices]).max())
     count = max(1, min(PORTIONS, n // (bandwidth + 1)))
     cuts = np.linspace(0, n, count + 1).astype(np.int64)
