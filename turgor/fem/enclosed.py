@@ -2,21 +2,24 @@
 
 A wall is closed, or closed by symmetry planes (:func:`turgor.mesh.opening.volume_field`) or an axis. Because nothing
 is linearised and the quadrature is exact, force and stiffness of a pressure in it are exact derivatives.
+
+Faces are interpolated, so that their share is a polynomial in the positions of their nodes whose coefficients belong to
+the kind of face: of edges in the plane bilinear, of faces in space trilinear in the x, y and z of the nodes. Shares and
+derivatives of all faces are a few products with them.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import Protocol
 
-import numba as nb
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import FASTMATH
-from turgor.mesh.cells import CELLS, face_cell
+from turgor.mesh.cells import CELLS, Cell, face_cell
 from turgor.mesh.opening import Cap, VolumeField
 
 Floats = NDArray[np.float64]
@@ -54,31 +57,87 @@ class FaceVolume:
 
     def __init__(self, nodes: Ints, field: VolumeField) -> None:
         self.nodes = nodes
-        cell = face_cell(nodes)
+        self._cell = face_cell(nodes)
         self._origin = field.origin
-        self._rule = (cell.shape_at_quadrature, cell.gradient_at_quadrature, cell.weights, field.axes)
+        self._form = TrilinearForm(self._cell, field.axes)
 
     def volume(self, x: Floats) -> float:
         """Return the volume, mm³."""
-        return float(_volumes(x - self._origin, self.nodes, *self._rule).sum())
+        return self._form.sum(self._places(x))
 
     def gradient(self, x: Floats) -> Floats:
         """Return the derivative by the nodes, ``(k, n, 3)``."""
-        return np.asarray(_gradients(x - self._origin, self.nodes, *self._rule))
+        return self._form.gradient(self._places(x))
 
     def traction(self, x: Floats) -> Floats:
         """Return what a unit pressure pushes the nodes with, ``(k, n, 3)``."""
-        return _tractions(x[self.nodes], *self._rule[:3])
+        return _tractions(_by_component(x, self.nodes), self._cell)
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 3 n, 3 n)``."""
-        _hessians(x - self._origin, self.nodes, *self._rule, self._hessian)
+        self._form.fill_hessian(self._places(x), self._hessian)
         return self._hessian
 
     @functools.cached_property
     def _hessian(self) -> Floats:
         n_dofs = 3 * self.nodes.shape[1]
-        return np.empty((len(self.nodes), n_dofs, n_dofs))
+        return np.zeros((len(self.nodes), n_dofs, n_dofs))
+
+    def _places(self, x: Floats) -> Floats:
+        return _by_component(x, self.nodes) - self._origin[:, None, None]
+
+
+class TrilinearForm:
+    """The share of a face in a volume, Σ C_abc x_a y_b z_c over its nodes.
+
+    M x · (x,ξ × x,η)/tr M is a determinant of three rows, in each product of which x, y and z come once.
+
+    Parameters
+    ----------
+    cell
+        The kind of face; its quadrature is exact.
+    axes
+        The diagonal of M.
+    """
+
+    def __init__(self, cell: Cell, axes: Floats) -> None:
+        shape, (first, second) = cell.shape_at_quadrature, cell.gradient_at_quadrature.transpose(2, 0, 1)
+        n = shape.shape[1]
+        C = np.zeros((n, n, n))
+        for order in itertools.permutations(range(3)):
+            rows = [np.empty(0)] * 3
+            rows[order[0]], rows[order[1]], rows[order[2]] = axes[order[0]] / axes.sum() * shape, first, second
+            sign = np.linalg.det(np.eye(3)[list(order)])
+            C += sign * np.einsum("q,qa,qb,qc->abc", cell.weights, *rows)
+        # For each axis first the one before it, then the axis itself and the one that follows.
+        self._turned = [C.transpose(np.roll(range(3), 1 - axis)).reshape(n, n * n) for axis in range(3)]
+
+    def sum(self, places: Floats) -> float:
+        """Return the shares of faces with nodes at `places` ``(3, k, n)`` together."""
+        return float(np.vdot(self._along(0, places), places[0]))
+
+    def gradient(self, places: Floats) -> Floats:
+        """Return the derivatives of the shares by the nodes, ``(k, n, 3)``."""
+        return np.stack([self._along(axis, places) for axis in range(3)], axis=2)
+
+    def fill_hessian(self, places: Floats, out: Floats) -> None:
+        """Fill the second derivatives ``(k, 3 n, 3 n)``, in which those by the same component are zero already."""
+        _, k, n = places.shape
+        blocks = out.reshape(k, n, 3, n, 3)
+        for axis in range(3):
+            following = (axis + 1) % 3
+            across = self._across(axis, places)
+            blocks[:, :, axis, :, following] = across
+            blocks[:, :, following, :, axis] = across.swapaxes(1, 2)
+
+    def _along(self, axis: int, places: Floats) -> Floats:
+        """Return the derivatives by the nodes' components along an axis, ``(k, n)``."""
+        return np.asarray(np.einsum("kab,kb->ka", self._across(axis, places), places[(axis + 1) % 3]))
+
+    def _across(self, axis: int, places: Floats) -> Floats:
+        """Return the derivatives by the components along an axis and the one that follows it, ``(k, n, n)``."""
+        _, k, n = places.shape
+        return np.asarray(places[(axis + 2) % 3] @ self._turned[axis]).reshape(k, n, n)
 
 
 class CapVolume:
@@ -88,26 +147,26 @@ class CapVolume:
         self.nodes = cap.nodes[None]
         self._cap = cap
         self._origin = field.origin
-        cell = face_cell(cap.faces)
-        self._rule = (cell.shape_at_quadrature, cell.gradient_at_quadrature, cell.weights, field.axes)
+        self._cell = face_cell(cap.faces)
+        self._form = TrilinearForm(self._cell, field.axes)
 
     def volume(self, x: Floats) -> float:
         """Return the volume, mm³."""
-        return float(_volumes(self._places(x), self._cap.faces, *self._rule).sum())
+        return self._form.sum(self._places(x))
 
     def gradient(self, x: Floats) -> Floats:
         """Return the derivative by the nodes of the rim, ``(1, n, 3)``."""
-        return self._on_rim(_gradients(self._places(x), self._cap.faces, *self._rule))
+        return self._on_rim(self._form.gradient(self._places(x)))
 
     def traction(self, x: Floats) -> Floats:
         """Return what a unit pressure pushes the rim with, ``(1, n, 3)``."""
-        return self._on_rim(_tractions(self._places(x)[self._cap.faces], *self._rule[:3]))
+        return self._on_rim(_tractions(self._places(x), self._cell))
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(1, 3 n, 3 n)``."""
         faces, weights, n = self._cap.faces, self._cap.weights, self.nodes.shape[1]
-        blocks = np.empty((len(faces), 18, 18))
-        _hessians(self._places(x), faces, *self._rule, blocks)
+        blocks = np.zeros((len(faces), 18, 18))
+        self._form.fill_hessian(self._places(x), blocks)
         blocks = blocks.reshape(len(faces), 6, 3, 6, 3)
         row, column = np.broadcast_arrays(faces[:, :, None], faces[:, None, :])
         size = weights[0].shape[0]
@@ -128,7 +187,7 @@ class CapVolume:
         return np.stack(columns, axis=1)[None]
 
     def _places(self, x: Floats) -> Floats:
-        return self._cap.places(x - self._origin)
+        return _by_component(self._cap.places(x - self._origin), self._cap.faces)
 
 
 _EDGE = CELLS["line3"]
@@ -212,91 +271,16 @@ class RevolvedVolume:
 
 
 def _products(a: Floats, b: Floats) -> Floats:
-    """Return ``a_i b_j`` of each edge, ``(k, 9)``."""
-    return (a[:, :, None] * b[:, None, :]).reshape(-1, 9)
+    """Return ``a_i b_j`` of each edge or face, ``(k, n²)``."""
+    return (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
 
 
-def _tractions(places: Floats, shape: Floats, gradient: Floats, weights: Floats) -> Floats:
-    """Return ∫ N n dA over faces with nodes at `places` ``(k, n, 3)``, by their nodes, ``(k, n, 3)``."""
-    first, second = np.einsum("qar,kai->rkqi", gradient, places)
-    return np.asarray(np.einsum("q,qa,kqi->kai", weights, shape, np.cross(first, second)))
+def _by_component(x: Floats, faces: Ints) -> Floats:
+    """Return where the nodes of faces are, ``(3, k, n)``."""
+    return np.stack([column[faces] for column in x.T])
 
 
-@nb.njit(cache=True, fastmath=FASTMATH, inline="always")
-def _frame(x, nodes, N, D, axes, position, first, second):  # type: ignore[no-untyped-def]
-    """Write the volume field (not yet divided by tr M) and the two tangents at one quadrature point."""
-    position[:] = 0.0
-    first[:] = 0.0
-    second[:] = 0.0
-    for a in range(len(nodes)):
-        for i in range(3):
-            value = x[nodes[a], i]
-            position[i] += axes[i] * N[a] * value
-            first[i] += D[a, 0] * value
-            second[i] += D[a, 1] * value
-
-
-@nb.njit(cache=True, inline="always")
-def _cross(a, b, out):  # type: ignore[no-untyped-def]
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@nb.njit(cache=True, fastmath=FASTMATH, parallel=True)
-def _volumes(x, faces, shape, gradient, weights, axes):  # type: ignore[no-untyped-def]
-    """Return each face's share ∫ M x · (x,ξ × x,η)/tr M of the enclosed volume, ``(k,)``, M = diag(`axes`)."""
-    out = np.zeros(len(faces))
-    scale = 1.0 / axes.sum()
-    for f in nb.prange(len(faces)):
-        position, first, second, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-        for q in range(len(weights)):
-            _frame(x, faces[f], shape[q], gradient[q], axes, position, first, second)
-            _cross(first, second, normal)
-            flux = position[0] * normal[0] + position[1] * normal[1] + position[2] * normal[2]
-            out[f] += scale * weights[q] * flux
-    return out
-
-
-@nb.njit(cache=True, fastmath=FASTMATH, parallel=True)
-def _gradients(x, faces, shape, gradient, weights, axes):  # type: ignore[no-untyped-def]
-    """Return the derivative of each face's share with respect to its nodes, ``(k, 6, 3)``."""
-    out = np.zeros((len(faces), faces.shape[1], 3))
-    scale = 1.0 / axes.sum()
-    for f in nb.prange(len(faces)):
-        position, first, second = np.empty(3), np.empty(3), np.empty(3)
-        normal, by_first, by_second = np.empty(3), np.empty(3), np.empty(3)
-        for q in range(len(weights)):
-            _frame(x, faces[f], shape[q], gradient[q], axes, position, first, second)
-            _cross(first, second, normal)
-            _cross(second, position, by_first)
-            _cross(position, first, by_second)
-            for a in range(faces.shape[1]):
-                for i in range(3):
-                    by_position = axes[i] * shape[q, a] * normal[i]
-                    by_tangents = gradient[q, a, 0] * by_first[i] + gradient[q, a, 1] * by_second[i]
-                    out[f, a, i] += scale * weights[q] * (by_position + by_tangents)
-    return out
-
-
-@nb.njit(cache=True, fastmath=FASTMATH, parallel=True)
-def _hessians(x, faces, shape, gradient, weights, axes, out):  # type: ignore[no-untyped-def]
-    """Fill the second derivative of each face's share, ``out (k, 18, 18)``: skew in the components of two nodes."""
-    n_nodes = faces.shape[1]
-    scale = 1.0 / axes.sum()
-    for f in nb.prange(len(faces)):
-        out[f] = 0.0
-        position, first, second = np.empty(3), np.empty(3), np.empty(3)
-        for q in range(len(weights)):
-            _frame(x, faces[f], shape[q], gradient[q], axes, position, first, second)
-            N, D, w = shape[q], gradient[q], weights[q] * scale
-            for a in range(n_nodes):
-                for b in range(n_nodes):
-                    on_position = D[a, 0] * D[b, 1] - D[b, 0] * D[a, 1]
-                    for i in range(3):
-                        for step in (1, 2):
-                            k, m = (i + step) % 3, (i + 3 - step) % 3
-                            on_second = axes[i] * N[a] * D[b, 0] - axes[k] * N[b] * D[a, 0]
-                            on_first = axes[i] * N[a] * D[b, 1] - axes[k] * N[b] * D[a, 1]
-                            value = on_second * second[m] - on_first * first[m] + on_position * position[m]
-                            out[f, 3 * a + i, 3 * b + k] += w * value if step == 1 else -w * value
+def _tractions(places: Floats, cell: Cell) -> Floats:
+    """Return ∫ N n dA over faces with nodes at `places` ``(3, k, n)``, by their nodes, ``(k, n, 3)``."""
+    first, second = np.einsum("qar,ika->rkqi", cell.gradient_at_quadrature, places)
+    return np.asarray(np.einsum("q,qa,kqi->kai", cell.weights, cell.shape_at_quadrature, np.cross(first, second)))
