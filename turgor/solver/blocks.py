@@ -91,11 +91,9 @@ class BlockMatrix:
 
     def sweep(self, right: Floats, x: Floats) -> tuple[Floats, Floats]:
         """Return what a sweep of Gauss–Seidel makes of `x` ``(3 n_nodes,)``, and the product with it."""
-        later = np.zeros_like(x)
+        found, product, target = np.empty_like(x), right.copy(), right.copy()
         for portions in self._turns:
-            _add_later(self.start, self.column, self.values, self._widest, self._bounds, portions, x, later)
-        found, product = np.empty_like(x), right.copy()
-        target = right - later
+            _take_later(self.start, self.column, self.values, self._widest, self._bounds, portions, x, target)
         if len(self._replaced):
             target += self._excess(x)
         for portions in self._turns:
@@ -209,12 +207,12 @@ def _coloured(start, column, order):  # type: ignore[no-untyped-def]
 
 
 @parallel
-def _add_later(start, column, values, widest, bounds, portions, x, out):  # type: ignore[no-untyped-def]
-    """Add to earlier rows of `out` what the rows of some portions, of which no two touch a common one, share in `x`."""
+def _take_later(start, column, values, widest, bounds, portions, x, out):  # type: ignore[no-untyped-def]
+    """Take from earlier rows of `out` what the rows of portions, of which no two touch a common one, share in `x`."""
     for k in nb.prange(len(portions)):
         near = np.empty(widest, x.dtype)
         for a in range(bounds[portions[k]], bounds[portions[k] + 1]):
-            _add_transposed(start, column, values, a, x[3 * a], x[3 * a + 1], x[3 * a + 2], near, out)
+            _add_transposed(start, column, values, a, -x[3 * a], -x[3 * a + 1], -x[3 * a + 2], near, out)
 
 
 @parallel

@@ -155,7 +155,7 @@ class _Krylov:
         self.improved[k], direction = self._preconditioner(self.basis[k])
         column = _orthogonalised(self.basis[: k + 1], direction)
         self.columns[: k + 2, k], length = column, float(column[-1])
-        self.basis[k + 1] = direction / length if length else 0.0
+        np.divide(direction, length or np.inf, out=self.basis[k + 1])
         self._size += 1
         return column
 
@@ -201,38 +201,42 @@ def _cycle(
 def _orthogonalised(basis: Floats, direction: Floats) -> Floats:
     """Take from `direction`, in place, its parts along the rows of `basis`; return these and the length left."""
     parts = np.zeros(len(basis) + 1)
-    before = _length(direction)
     for _ in range(2):
-        part = _products(basis, direction)
-        _add_combined(basis, -part, direction)
+        *part, square = _products(basis, direction)
         parts[:-1] += part
-        parts[-1] = _length(direction)
-        if parts[-1] > CANCELLED * before:
+        parts[-1] = np.sqrt(_add_combined(basis, -np.array(part), direction))
+        if parts[-1] > CANCELLED * np.sqrt(square):
             break
-        before = parts[-1]
     return parts
 
 
 def _length(vector: Floats) -> float:
-    return float(np.sqrt(_products(vector[None], vector)[0]))
+    return float(np.sqrt(_products(vector[:0].reshape(0, len(vector)), vector)[0]))
 
 
 def _products(basis: Floats, vector: Floats) -> Floats:
-    """Return the products of the rows of `basis` with `vector`."""
-    parts = np.empty((CHUNKS, len(basis)))
+    """Return the products of the rows of `basis` and of `vector` itself with it."""
+    parts = np.empty((CHUNKS, len(basis) + 1))
     _project(basis, vector, parts)
     return np.asarray(parts.sum(axis=0))
 
 
+def _add_combined(basis: Floats, weights: Floats, out: Floats) -> float:
+    """Add the sum of the first rows of `basis`, one for each of `weights` and times it, to `out`; return its square."""
+    squares = np.empty(CHUNKS)
+    _combine(basis, weights, out, squares)
+    return float(squares.sum())
+
+
 @parallel
 def _project(basis, vector, out):  # type: ignore[no-untyped-def]
-    """Fill `out` ``(CHUNKS, n)`` with the products of the rows of `basis` with `vector`, chunk by chunk."""
+    """Fill `out` ``(CHUNKS, n + 1)`` with the products of the rows of `basis` and of `vector` with it, by chunks."""
     n = len(vector)
     for chunk in nb.prange(CHUNKS):
         first, last = chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS
         here = vector[first:last]
-        for k in range(len(basis)):
-            row = basis[k, first:last]
+        for k in range(len(basis) + 1):
+            row = basis[k, first:last] if k < len(basis) else here
             total = 0.0
             for m in range(len(row)):
                 total += row[m] * here[m]
@@ -240,8 +244,7 @@ def _project(basis, vector, out):  # type: ignore[no-untyped-def]
 
 
 @parallel
-def _add_combined(basis, weights, out):  # type: ignore[no-untyped-def]
-    """Add the sum of the first rows of `basis`, one for each of `weights` and times it, to `out`."""
+def _combine(basis, weights, out, squares):  # type: ignore[no-untyped-def]
     n = len(out)
     for chunk in nb.prange(CHUNKS):
         first, last = chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS
@@ -250,3 +253,7 @@ def _add_combined(basis, weights, out):  # type: ignore[no-untyped-def]
             row, weight = basis[k, first:last], weights[k]
             for m in range(len(row)):
                 here[m] += weight * row[m]
+        square = 0.0
+        for m in range(len(here)):
+            square += here[m] * here[m]
+        squares[chunk] = square
