@@ -79,6 +79,7 @@ def of_the_element(system: System) -> list[Kernel]:
     tau, tangent = np.zeros((m, q, 6)), np.ones((m, q, 21))
     pressure, bulk = np.zeros((m, q)), np.ones((m, 1, 1))
     force, packed = np.empty((m, n, 3)), np.empty((m, 3 * n * (3 * n + 1) // 2))
+    gradient = np.empty((m, 1, 3, n))
     sizes = (kernels.counted(3), kernels.counted(n))
     places = kernels.packing(n, 3)
     # Products and sums of add_products for the six blocks on and above the diagonal, and of add_condensed.
@@ -97,7 +98,7 @@ def of_the_element(system: System) -> list[Kernel]:
         Kernel(
             "stiffness",
             lambda: kernels.element_stiffness(
-                F, solid.G, solid.dV, tau, tangent, pressure, solid.modes, bulk, *sizes, places, packed
+                F, solid.G, solid.dV, tau, tangent, pressure, solid.modes, bulk, *sizes, places, packed, gradient
             ),
             operations=stiffness,
         ),

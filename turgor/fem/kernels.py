@@ -214,12 +214,12 @@ def transformed(A, B, out):  # type: ignore[no-untyped-def]
 @inlined
 def sandwich(A, B, out):  # type: ignore[no-untyped-def]
     """Write the symmetric tensor ``A B Aᵀ`` of ``A (3, 3)`` and ``B (6,)`` into ``out (6,)``."""
-    half = np.empty(3)
     for i in range(3):
-        for k in range(3):
-            half[k] = A[i, 0] * B[SYM[0, k]] + A[i, 1] * B[SYM[1, k]] + A[i, 2] * B[SYM[2, k]]
+        h0 = A[i, 0] * B[0] + A[i, 1] * B[3] + A[i, 2] * B[5]
+        h1 = A[i, 0] * B[3] + A[i, 1] * B[1] + A[i, 2] * B[4]
+        h2 = A[i, 0] * B[5] + A[i, 1] * B[4] + A[i, 2] * B[2]
         for j in range(i, 3):
-            out[SYM[i, j]] = half[0] * A[j, 0] + half[1] * A[j, 1] + half[2] * A[j, 2]
+            out[SYM[i, j]] = h0 * A[j, 0] + h1 * A[j, 1] + h2 * A[j, 2]
 
 
 @inlined
@@ -358,14 +358,15 @@ def packing(n_nodes: int, d: int) -> NDArray[np.uintp]:
 
 @parallel
 def element_stiffness(  # type: ignore[no-untyped-def]
-    F, G, dV, tau, tangent, pressure, modes, bulk, components, nodes, places, packed
+    F, G, dV, tau, tangent, pressure, modes, bulk, components, nodes, places, packed, gradient
 ):
     """Fill the packed upper triangles ``packed (m, d n (d n + 1)/2)`` of the element stiffness matrices.
 
     ``K_ab = ∫ g_a · (c + τ) · g_b dV + Σ_kl D_kl b_k b_l`` with the element's pressure condensed (Simo, Taylor and
     Pister 1985), ``b_k = ∫ ψ_k ∂J/∂u dV``. `pressure` ``(m, q)`` is the one that the geometric part uses, `bulk`
     ``(m, k, k)`` is D, ``∫ ψ_k U'' ψ_l dV / V²``, and `places` is :func:`packing`. `components` and `nodes` are
-    :func:`counted`: of hexahedra, loops of known lengths take half the time.
+    :func:`counted`: of hexahedra, loops of known lengths take half the time. ``gradient (m, k, d, n)`` is filled with
+    the b_k, unless it is empty.
     """
     for chunk in nb.prange(CHUNKS):
         d, n = len(components), len(nodes)
@@ -387,16 +388,5 @@ def element_stiffness(  # type: ignore[no-untyped-def]
             flat = K.ravel()
             for at in range(len(places)):
                 packed[e, at] = flat[places[at]]
-
-
-@parallel
-def volume_gradients(F, G, dV, modes, gradient):  # type: ignore[no-untyped-def]
-    """Fill ``gradient (m, k, d, n)`` with ``b_k = ∫ ψ_k ∂J/∂u dV`` of every element."""
-    for chunk in nb.prange(CHUNKS):
-        inv = np.empty((3, 3))
-        g = np.empty((3, G.shape[3]))
-        for e in range(chunk * len(G) // CHUNKS, (chunk + 1) * len(G) // CHUNKS):
-            gradient[e] = 0.0
-            for q in range(G.shape[1]):
-                J = spatial_gradients(F[e, q], G[e, q], inv, g)
-                add_volume_gradients(J * dV[e, q], g, modes[e, q], gradient[e])
+            if len(gradient):
+                gradient[e] = b

@@ -187,7 +187,7 @@ class Solid(Mixed):
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill the element stiffnesses, the pressure condensed."""
-        self._fill_stiffness(state, lagged, self._bulk(self._lagged_dilatation(lagged)), out)
+        self._fill_stiffness(state, lagged, self._bulk(self._lagged_dilatation(lagged)), out, np.empty((0, 0, 0, 0)))
 
     def split_stiffness(self, state: State, lagged: Floats, augmentation: float, out: Floats) -> VolumeEquations:
         """Fill the element stiffnesses with a part of their bulk modulus; return the rest as equations of their own.
@@ -201,9 +201,8 @@ class Solid(Mixed):
         modulus = self._tangent_modulus()
         kept = augmentation * modulus
         share = kept / (kept + self.volume * bulk[:, 0, 0])
-        self._fill_stiffness(state, lagged, share[:, None, None] * bulk, out)
         gradient = np.empty((*dilatation.shape, self.cell.dimension, self.G.shape[3]))
-        kernels.volume_gradients(self._now.F, self.G, self.dV, self.modes, gradient)
+        self._fill_stiffness(state, lagged, share[:, None, None] * bulk, out, gradient)
         return VolumeEquations(
             self.nodes,
             self.volume,
@@ -244,8 +243,11 @@ class Solid(Mixed):
         kernels.element_forces(self._now.F, self.G, self.dV, self._turned, pressure, self._force)
         add_at_nodes(self.nodes, self._force, out)
 
-    def _fill_stiffness(self, state: State, lagged: Floats, bulk: Floats, out: Floats) -> None:
-        """Fill the element stiffnesses with ``bulk (m, k, k)``, that of :meth:`_bulk` or a part of it."""
+    def _fill_stiffness(self, state: State, lagged: Floats, bulk: Floats, out: Floats, gradient: Floats) -> None:
+        """Fill the element stiffnesses with ``bulk (m, k, k)``, that of :meth:`_bulk` or a part of it.
+
+        And the volumes' ``gradient (m, k, d, n)``, unless it is empty.
+        """
         self._deform(state.u)
         self._respond()
         kernels.transformed(self._now.F, self._lagged_stress(lagged), self._turned)
@@ -262,6 +264,7 @@ class Solid(Mixed):
             kernels.counted(self.cell.n_nodes),
             self._places,
             out,
+            gradient,
         )
 
     def _tangent_modulus(self) -> Floats:

@@ -9,7 +9,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.fem.kernels import parallel
+from turgor.fem.kernels import jit, parallel
 from turgor.fem.state import State
 
 Floats = NDArray[np.float64]
@@ -145,9 +145,15 @@ NO_NODES = np.empty((0, 1), np.int32)
 
 def add_at_nodes(nodes: Ints, values: Floats, out: Floats) -> None:
     """Add block vectors ``values (n_blocks, nodes_per_block, d)`` to ``out (n_points, d)``."""
-    flat = nodes.ravel()
-    for i in range(out.shape[1]):
-        out[:, i] += np.bincount(flat, values[:, :, i].ravel(), minlength=len(out))
+    _add(nodes, np.ascontiguousarray(values), out)
+
+
+@jit
+def _add(nodes, values, out):  # type: ignore[no-untyped-def]
+    for block in range(len(nodes)):
+        for a in range(nodes.shape[1]):
+            for i in range(out.shape[1]):
+                out[nodes[block, a], i] += values[block, a, i]
 
 
 def pack_symmetric(blocks: Floats, out: Floats, factor: float = 1.0) -> None:
