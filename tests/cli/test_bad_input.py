@@ -237,6 +237,9 @@ def test_a_bad_change_names_the_option() -> None:
     assert "--set: loads.3.value: there is no such item" in the_message(["run", case, "--set", "loads.3.value=1 kPa"])
     assert "--set: this is not an assignment" in the_message(["run", case, "--set", "mesh.size"])
     assert "--set: name.x: 'name' holds no keys" in the_message(["run", case, "--set", "name.x=1"])
+    # What shows only when the mesh is there.
+    change = "supports.0.surface=nowhere"
+    assert "--set: supports.0.surface: the actuator has no" in the_message(["run", case, "--set", change])
 
 
 def test_no_python_of_a_case_is_run() -> None:

@@ -58,7 +58,7 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run a case: find the rubber, mesh the shape, load it, measure, report."""
-    with naming(case_file):
+    with naming(case_file, changes or ()):
         case = tg.load_case(case_file, changes or ())
         folder = out or Path(case.name)
         with progress_on(Console(stderr=True)) as progress:
@@ -219,7 +219,7 @@ def mesh(
     as_json: AsJson = False,
 ) -> None:
     """Mesh the actuator of a case, write the mesh and say how good it is."""
-    with naming(case_file), telling_warnings():
+    with naming(case_file, changes or ()), telling_warnings():
         case = tg.load_draft(case_file, changes or ())
         meshed = tg.mesh_case(case, picture)
     path = out or Path(f"{case.name}.vtu")
@@ -246,7 +246,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write a case as a model that another program runs: mesh, materials, supports, loads and states."""
-    with naming(case_file):
+    with naming(case_file, changes or ()):
         case = tg.load_case(case_file, changes or ())
         path = out or Path(f"{case.name}.inp")
         mesh = tg.export_case(case, path)

@@ -7,7 +7,7 @@ import logging
 import signal
 import tempfile
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +64,12 @@ def _heeding_termination() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def naming(file: Path) -> Iterator[None]:
-    """Let an InputError that knows no file name this one."""
+def naming(file: Path, changes: Iterable[str] = ()) -> Iterator[None]:
+    """Let an InputError that knows no file name this one, or the option that changed the key."""
     try:
         yield
     except tg.InputError as error:
-        raise error.at(file=file) from error
+        raise error.read_from(file, changes) from error
 
 
 @contextlib.contextmanager

@@ -6,6 +6,7 @@ Bad input raises :class:`InputError`; a solver that stops short of its target ra
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 EXIT_BAD_INPUT = 2
@@ -66,6 +67,13 @@ class InputError(TurgorError):
             value=self.value,
             expected=self.expected,
         )
+
+    def read_from(self, file: str | Path, changes: Iterable[str]) -> InputError:
+        """Return a copy that also names the `file`, or ``--set`` where one of its `changes` KEY=VALUE gave the key."""
+        key = self.key or ""
+        changed = [change.partition("=")[0].strip() for change in changes]
+        is_changed = any(key == path or key.startswith(f"{path}.") for path in changed)
+        return self.at(file="--set" if is_changed else file)
 
 
 class MissingPackageError(TurgorError):

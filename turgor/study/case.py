@@ -303,16 +303,15 @@ def _load(kind: type[Kind], path: str | Path, changes: Sequence[str]) -> Kind:
     path = Path(path)
     data = read_mapping(path)
     data.setdefault("name", _name_from(path))
-    changed = [override(data, change) for change in changes]
+    for change in changes:
+        override(data, change)
     try:
         return kind.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
         found = explain(error, data)
     except InputError as error:
         found = error
-    key = found.key or ""
-    by_change = any(key == change or key.startswith(f"{change}.") for change in changed)
-    raise found.at(file="--set" if by_change else path)
+    raise found.read_from(path, changes)
 
 
 def _name_from(path: Path) -> str:

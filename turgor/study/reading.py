@@ -139,8 +139,8 @@ def _read_text(path: Path) -> str:
         raise InputError(f"byte {error.start + 1} is not UTF-8 text", file=path, expected="a text file") from error
 
 
-def override(data: dict[str, Any], assignment: str) -> str:
-    """Set one key of `data` in place from ``key.path=value`` and return its dotted path.
+def override(data: dict[str, Any], assignment: str) -> None:
+    """Set one key of `data` in place from ``key.path=value``.
 
     List items are numbered from 0 (``loads.0.value``); mappings that are absent are made; the value is YAML.
 
@@ -182,7 +182,6 @@ def override(data: dict[str, Any], assignment: str) -> str:
             raise InputError(
                 f"'{parent}' holds no keys", file="--set", key=path, value=here, expected="a mapping or list"
             )
-    return path
 
 
 def _list_index(part: str, items: list[Any], path: str) -> int:
