@@ -57,6 +57,23 @@ def test_the_ball_swells(ball: Path, tmp_path: Path) -> None:
     assert Path(again.geometry.file).parent.name == "data"
 
 
+def test_the_copy_of_a_deck_holds_what_it_includes(ball: Path, tmp_path: Path) -> None:
+    deck = tmp_path / "ball.inp"
+    whole = deck.read_text()
+    begin = whole.index("*ELEMENT")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "nodes.inp").write_text(whole[:begin].rstrip("\n"))
+    deck.write_text(f"** a ball\n*Include, input=parts/nodes.inp\n{whole[begin:]}")
+    done = tg.run(tg.load_case(ball), tmp_path / "run")
+    copy = tmp_path / "run" / "data" / "ball.inp"
+    assert copy.read_text() == f"** a ball\n{whole}"
+    again = tg.run(tg.load_case(ball), tmp_path / "run", resume=True)
+    assert again.summary["final"] == done.summary["final"]
+    (tmp_path / "parts" / "nodes.inp").unlink()
+    carried = tg.run(tg.load_case(tmp_path / "run" / "case.yaml"), tmp_path / "carried")
+    assert carried.summary["final"] == done.summary["final"]
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

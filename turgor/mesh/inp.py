@@ -6,7 +6,6 @@ meshio's reader leaves out the surfaces and the numbers by which they name their
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,6 +38,12 @@ FACES = {
 }
 """Corners of the faces S1, S2, … of each kind of cell in Abaqus's count."""
 
+_BLOCK = re.compile(r"^\*(?!\*)", re.MULTILINE)
+"""What begins a block: a star, of which two are a comment."""
+
+_DEEPEST = 8
+"""Files that include each other, one in the other."""
+
 _LONGEST_RANGE = 10_000_000
 """Of the numbers of a set; no mesh that can be solved has more cells or nodes."""
 
@@ -59,7 +64,7 @@ class _Deck:
 def read_inp(path: Path) -> RawMesh:
     """Read the mesh of a .inp file; raise InputError where it cannot be understood."""
     deck = _Deck()
-    _read_into(deck, path)
+    _read_into(deck, whole_text(path))
     if not deck.elements:
         raise InputError("the file holds no elements of a kind that is known", expected="C3D10, C3D20, CPS6, …")
     place = {number: k for k, number in enumerate(deck.nodes)}
@@ -78,10 +83,20 @@ def read_inp(path: Path) -> RawMesh:
     )
 
 
-def _read_into(deck: _Deck, path: Path, depth: int = 0) -> None:
-    if depth > 8:
+def whole_text(path: Path, depth: int = 0) -> str:
+    """Return the text of a .inp file with those of the files that it includes where it does so."""
+    if depth > _DEEPEST:
         raise InputError("the files include each other without end")
-    for keyword, options, rows in _blocks(path.read_text(encoding="utf-8", errors="replace")):
+    head, *blocks = _BLOCK.split(path.read_text(encoding="utf-8", errors="replace"))
+    parts = [head]
+    for block in blocks:
+        keyword, options, _ = _taken_apart(block)
+        parts.append(whole_text(path.parent / options["INPUT"], depth + 1) if keyword == "INCLUDE" else f"*{block}")
+    return "".join(part if part.endswith("\n") or not part else f"{part}\n" for part in parts)
+
+
+def _read_into(deck: _Deck, text: str) -> None:
+    for keyword, options, rows in map(_taken_apart, _BLOCK.split(text)[1:]):
         if keyword == "NODE":
             deck.nodes |= {int(row[0]): [*map(float, row[1:4]), 0.0, 0.0][:3] for row in rows}
             if "NSET" in options:
@@ -96,23 +111,20 @@ def _read_into(deck: _Deck, path: Path, depth: int = 0) -> None:
             deck.surfaces[options["NAME"]] = parts
         elif keyword == "SOLID SECTION" and options["ELSET"] not in deck.sections:
             deck.sections.append(options["ELSET"])
-        elif keyword == "INCLUDE":
-            _read_into(deck, path.parent / options["INPUT"], depth + 1)
         elif keyword == "INSTANCE" and any(float(x) for row in rows for x in row):
             raise InputError("an instance is moved or turned in the assembly", expected="a flat file of one part")
 
 
-def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Yield keyword, options in capitals and rows of each block; names in options are in capitals, file names not."""
-    for block in re.split(r"^\*(?!\*)", text, flags=re.MULTILINE)[1:]:
-        lines = [line for line in block.splitlines() if line.strip() and not line.startswith("**")]
-        while len(lines) > 1 and lines[0].rstrip().endswith(","):
-            lines[0] += lines.pop(1)
-        keyword, *rest = (word.strip() for word in lines[0].split(","))
-        pairs = (word.partition("=") for word in rest)
-        options = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
-        options = {key: value if key == "INPUT" else value.upper() for key, value in options.items()}
-        yield keyword.upper(), options, [[w.strip() for w in ln.split(",") if w.strip()] for ln in lines[1:]]
+def _taken_apart(block: str) -> tuple[str, dict[str, str], list[list[str]]]:
+    """Return keyword, options in capitals and rows of a block; names in options are in capitals, file names not."""
+    lines = [line for line in block.splitlines() if line.strip() and not line.startswith("**")]
+    while len(lines) > 1 and lines[0].rstrip().endswith(","):
+        lines[0] += lines.pop(1)
+    keyword, *rest = (word.strip() for word in lines[0].split(","))
+    pairs = (word.partition("=") for word in rest)
+    options = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
+    options = {key: value if key == "INPUT" else value.upper() for key, value in options.items()}
+    return keyword.upper(), options, [[w.strip() for w in ln.split(",") if w.strip()] for ln in lines[1:]]
 
 
 def _add_elements(deck: _Deck, options: dict[str, str], rows: list[list[str]]) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from itertools import chain, count
 from pathlib import Path
 
+from turgor.mesh.inp import whole_text
 from turgor.results.files import is_same_file
 from turgor.study.case import Case
 
@@ -28,11 +28,16 @@ def copy_data(names: dict[Path, str], folder: Path) -> None:
         copy = folder / name
         if not is_same_file(copy, path):
             copy.parent.mkdir(exist_ok=True)
-            shutil.copyfile(path, copy)
+            copy.write_bytes(_content(path))
 
 
 def same_data(names: dict[Path, str], folder: Path) -> bool:
     """Say whether every data file still is what its copy in the run's folder is."""
     return all(
-        (folder / name).is_file() and (folder / name).read_bytes() == path.read_bytes() for path, name in names.items()
+        (folder / name).is_file() and (folder / name).read_bytes() == _content(path) for path, name in names.items()
     )
+
+
+def _content(path: Path) -> bytes:
+    """Return what stands in a file, with what a .inp file includes: the copy stands alone."""
+    return whole_text(path).encode() if path.suffix == ".inp" else path.read_bytes()
