@@ -203,18 +203,20 @@ class System:
             scale = max(scale, float(np.linalg.norm(part)))
         return total, scale
 
-    def stiffness(self, state: State) -> Floats:
+    def stiffness(self, state: State, room: Floats | None = None) -> Floats:
         """Return the stored values of ∂²Π/∂u² on the free degrees of freedom, in the pattern's order.
 
         Where the pattern has no room for what touches now, :attr:`pattern`
-        is another one afterwards.
+        is another one afterwards. The values are in `room`, those of an earlier call, if there are as many of them.
         """
         packed, _ = self._fill_blocks(state)
         self._touching = [self._touching_blocks(contact, state) for contact in self.contacts]
         if not all(self.pattern.covers(nodes) for nodes, _ in self._touching):
             self._couplings += [contact.couplings(state.u) for contact in self.contacts]
             self.pattern = self._make_pattern()
-        values = np.empty(self.pattern.n_stored)
+        values = room
+        if values is None or len(values) != self.pattern.n_stored:
+            values = np.empty(self.pattern.n_stored)
         self.pattern.sum_blocks(packed, values)
         for nodes, touching in self._touching:
             self.pattern.add_blocks(nodes, touching, values)

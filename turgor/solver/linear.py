@@ -50,6 +50,7 @@ class LinearSolver(StiffnessSolver):
     """
 
     def __init__(self, row_start: Ints, column: Ints) -> None:
+        self._entries: Floats | None = None
         self.take(row_start, column)
 
     def take(self, row_start: Ints, column: Ints) -> None:
@@ -66,12 +67,12 @@ class LinearSolver(StiffnessSolver):
         is_large = self.n >= LARGE
         if is_large:
             self.release_factors()
-        values = system.stiffness(state)
+        self._entries = system.stiffness(state, self._entries)
         if self.column is not system.pattern.column:
             self.take(system.pattern.row_start, system.pattern.column)
         if is_large:
             system.forget_blocks()
-        self.factorise(values)
+        self.factorise(self._entries)
 
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
         """Return the step for a right-hand side, exact but for rounding."""
