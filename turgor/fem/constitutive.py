@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from turgor.fem.kernels import PACK, SYM, inlined, jit, parallel
+from turgor.fem.kernels import PACK, SYM, inlined, parallel
 
 # Components (i, j) in the stored order of a symmetric tensor.
 ROW = np.array([0, 1, 2, 0, 1, 0])
@@ -102,58 +102,6 @@ def invariant_response(F, J, W1, W2, W11, W12, W22, tau, tangent):  # type: igno
                 )
                 at += 1
         add_projected(fictitious, tau[p], tangent[p])
-
-
-@jit
-def diagonalise(a, vectors):  # type: ignore[no-untyped-def]
-    """Bring the symmetric 3 × 3 matrix `a` to diagonal form in place by cyclic Jacobi rotations.
-
-    `vectors` receives the eigenvectors in its columns. Jacobi keeps full relative accuracy at equal
-    eigenvalues, where closed formulas lose half of the digits (Demmel and Veselić 1992).
-    """
-    vectors[:] = 0.0
-    for i in range(3):
-        vectors[i, i] = 1.0
-    for _ in range(10):
-        off = a[0, 1] ** 2 + a[0, 2] ** 2 + a[1, 2] ** 2
-        if off <= 1e-32 * (a[0, 0] ** 2 + a[1, 1] ** 2 + a[2, 2] ** 2):
-            break
-        for r in range(3):
-            p, q = (1, 2) if r == 0 else ((0, 2) if r == 1 else (0, 1))
-            if a[p, q] == 0.0:
-                continue
-            slope = (a[q, q] - a[p, p]) / (2.0 * a[p, q])
-            t = (1.0 if slope >= 0 else -1.0) / (abs(slope) + np.sqrt(slope * slope + 1.0))
-            c = 1.0 / np.sqrt(t * t + 1.0)
-            s = t * c
-            a[p, p] -= t * a[p, q]
-            a[q, q] += t * a[p, q]
-            a[p, q] = 0.0
-            a[q, p] = 0.0
-            x, y = a[r, p], a[r, q]
-            a[r, p] = c * x - s * y
-            a[r, q] = s * x + c * y
-            a[p, r] = a[r, p]
-            a[q, r] = a[r, q]
-            for i in range(3):
-                x, y = vectors[i, p], vectors[i, q]
-                vectors[i, p] = c * x - s * y
-                vectors[i, q] = s * x + c * y
-
-
-@parallel
-def isochoric_stretches(F, J, stretches, directions):  # type: ignore[no-untyped-def]
-    """Fill the isochoric principal ``stretches (p, 3)`` and spatial ``directions (p, 3, 3)`` (in columns)."""
-    for p in nb.prange(len(F)):
-        packed = np.empty(6)
-        b = np.empty((3, 3))
-        left_cauchy_green(F[p], J[p], packed)
-        for i in range(3):
-            for j in range(3):
-                b[i, j] = packed[SYM[i, j]]
-        diagonalise(b, directions[p])
-        for i in range(3):
-            stretches[p, i] = np.sqrt(b[i, i])
 
 
 @parallel

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from turgor.fem import constitutive, kernels
 from turgor.fem.elements import pressure_modes, reference_gradients
+from turgor.fem.principal import isochoric_stretches
 from turgor.fem.section import Section
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes
@@ -18,6 +19,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 TANGENT_SIZE = 21
+
+PORTION = 4096
+"""Points at which a law in stretches is evaluated together: what it computes on the way stays in the cache."""
 
 AUGMENTATION = 10.0
 """Shear moduli that stand for the bulk modulus in the merit of a mixed step."""
@@ -133,7 +137,7 @@ class Solid(Mixed):
         """Return the principal stretches of the isochoric deformation at the quadrature points, ``(m, q, 3)``."""
         self._deform(u)
         stretches, directions = np.empty((self._now.J.size, 3)), np.empty((self._now.J.size, 3, 3))
-        constitutive.isochoric_stretches(self._now.F.reshape(-1, 3, 3), self._now.J.ravel(), stretches, directions)
+        isochoric_stretches(self._now.F.reshape(-1, 3, 3), self._now.J.ravel(), stretches, directions)
         return stretches.reshape(*self._now.J.shape, 3)
 
     def rounding(self, u: Floats) -> float:
@@ -328,8 +332,12 @@ class Solid(Mixed):
             return self.material.derivatives(I1, I2)
         assert isinstance(self.material, StretchModel)
         stretches, directions = np.empty((len(J), 3)), np.empty_like(F)
-        constitutive.isochoric_stretches(F, J, stretches, directions)
-        return *self.material.derivatives(stretches), stretches, directions
+        isochoric_stretches(F, J, stretches, directions)
+        density, dW, d2W = np.empty(len(J)), np.empty((len(J), 3)), np.empty((len(J), 3, 3))
+        for begin in range(0, len(J), PORTION):
+            part = slice(begin, begin + PORTION)
+            density[part], dW[part], d2W[part] = self.material.derivatives(stretches[part])
+        return density, dW, d2W, stretches, directions
 
     def _find_response(self) -> None:
         F, J = self._now.F.reshape(-1, 3, 3), self._now.J.ravel()

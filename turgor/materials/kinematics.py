@@ -15,6 +15,13 @@ FOURTH: Array = np.einsum("ik,jl->ijkl", IDENTITY, IDENTITY)
 """The fourth-order identity δ_ik δ_jl."""
 
 
+def diagonal_matrices(diagonal: Array) -> Array:
+    """Return the matrices ``(..., 3, 3)`` with a given diagonal ``(..., 3)``."""
+    matrices = np.zeros((*diagonal.shape, 3))
+    matrices.reshape(-1, 9)[:, ::4] = diagonal.reshape(-1, 3)
+    return matrices
+
+
 def tensor(x: Array, rank: int) -> Array:
     """Append `rank` axes of length one."""
     return np.asarray(x, dtype=float).reshape(np.shape(x) + (1,) * rank)

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from turgor.materials.hyperelastic import StretchModel, modulus
-from turgor.materials.kinematics import IDENTITY, Array
+from turgor.materials.kinematics import Array, diagonal_matrices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,4 +36,4 @@ class Hencky(StretchModel):
         W = self.mu * (logarithm**2).sum(axis=-1)
         slope = 2.0 * self.mu * logarithm / stretches
         diagonal = 2.0 * self.mu * (1.0 - logarithm) / stretches**2
-        return W, slope, diagonal[..., None] * IDENTITY
+        return W, slope, diagonal_matrices(diagonal)

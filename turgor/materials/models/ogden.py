@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from turgor.common.errors import InputError
 from turgor.materials.hyperelastic import StretchModel, modulus, number
-from turgor.materials.kinematics import IDENTITY, Array
+from turgor.materials.kinematics import Array, diagonal_matrices
 
 _STARTS = (-12.0, -6.0, -3.0, -1.5, 0.5, 1.5, 2.5, 4.0, 6.0, 9.0, 14.0)
 _RANGE = (-40.0, 40.0)
@@ -64,11 +64,12 @@ class OgdenModel(StretchModel):
                 diagonal += 2.0 * mu * (1.0 - logarithm) / stretches**2
                 continue
             # expm1 keeps the energy accurate near the undeformed state.
-            W = W + 2.0 * mu / alpha**2 * np.expm1(alpha * logarithm).sum(axis=-1)
+            grown = np.expm1(alpha * logarithm)
+            W = W + 2.0 * mu / alpha**2 * (grown[..., 0] + grown[..., 1] + grown[..., 2])
             power = 2.0 * mu / alpha * np.exp((alpha - 2.0) * logarithm)
             slope += power * stretches
             diagonal += (alpha - 1.0) * power
-        return W, slope, diagonal[..., None] * IDENTITY
+        return W, slope, diagonal_matrices(diagonal)
 
 
 @dataclass(frozen=True, kw_only=True)
