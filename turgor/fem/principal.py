@@ -14,6 +14,7 @@ from turgor.fem.constitutive import left_cauchy_green
 from turgor.fem.kernels import CHUNKS, inlined, jit, parallel
 
 LANES = 8
+"""Points that are rotated together."""
 
 VECTORS = 6
 """Row of the lanes from which on the directions stand; before it, the matrices' six components in stored order."""
