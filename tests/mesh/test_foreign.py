@@ -145,6 +145,9 @@ def test_cells_that_another_program_turns_the_other_way_are_turned(tmp_path):
             "GENERATE.*7, 7, 0.*a step of 1",
         ),
         (("*Elset, elset=Lower\n 7,", "*Elset, elset=Lower, generate\n 7, 999999999999"), "GENERATE.*at most 10000000"),
+        (("*Elset, elset=Lower", "*Include, input=gone.inp\n*Elset, elset=Lower"), "no such file to include.*gone.inp"),
+        (("*Elset, elset=Lower", "*Include\n*Elset, elset=Lower"), "to be included and not named"),
+        (("*Elset, elset=Lower", "*Include, input=cube.inp\n*Elset, elset=Lower"), "include each other without end"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(change, message, tmp_path):

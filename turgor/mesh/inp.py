@@ -91,8 +91,18 @@ def whole_text(path: Path, depth: int = 0) -> str:
     parts = [head]
     for block in blocks:
         keyword, options, _ = _taken_apart(block)
-        parts.append(whole_text(path.parent / options["INPUT"], depth + 1) if keyword == "INCLUDE" else f"*{block}")
+        parts.append(whole_text(_included(path, options), depth + 1) if keyword == "INCLUDE" else f"*{block}")
     return "".join(part if part.endswith("\n") or not part else f"{part}\n" for part in parts)
+
+
+def _included(path: Path, options: dict[str, str]) -> Path:
+    """Return the file that an ``*INCLUDE`` names; raise InputError if it names none or there is no such file."""
+    name = options.get("INPUT", "")
+    included = path.parent / name
+    if not included.is_file():
+        problem = "there is no such file to include" if name else "a file is to be included and not named"
+        raise InputError(problem, key="*INCLUDE", value=name or None, expected="INPUT=FILE, beside the deck")
+    return included
 
 
 def _read_into(deck: _Deck, text: str) -> None:
