@@ -389,4 +389,8 @@ def element_stiffness(  # type: ignore[no-untyped-def]
             for at in range(len(places)):
                 packed[e, at] = flat[places[at]]
             if len(gradient):
-                gradient[e] = b
+                # As a slice, it would take five seconds more to compile.
+                for k in range(modes.shape[2]):
+                    for i in range(d):
+                        for a in range(n):
+                            gradient[e, k, i, a] = b[k, i, a]
