@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from turgor.mesh.cells import CELLS, Cell, face_cell
+from turgor.mesh.cells import CELLS, Cell, face_cell, face_frames
 from turgor.mesh.opening import Cap, VolumeField
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class FaceVolume:
 
     def traction(self, x: Floats) -> Floats:
         """Return what a unit pressure pushes the nodes with, ``(k, n, 3)``."""
-        return _tractions(_by_component(x, self.nodes), self._cell)
+        return _tractions(x[self.nodes], self._cell)
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(k, 3 n, 3 n)``."""
@@ -104,11 +104,10 @@ class TrilinearForm:
         shape, (first, second) = cell.shape_at_quadrature, cell.gradient_at_quadrature.transpose(2, 0, 1)
         n = shape.shape[1]
         C = np.zeros((n, n, n))
-        for order in itertools.permutations(range(3)):
-            rows = [np.empty(0)] * 3
-            rows[order[0]], rows[order[1]], rows[order[2]] = axes[order[0]] / axes.sum() * shape, first, second
-            sign = np.linalg.det(np.eye(3)[list(order)])
-            C += sign * np.einsum("q,qa,qb,qc->abc", cell.weights, *rows)
+        for i, j, k in itertools.permutations(range(3)):
+            rows = {i: axes[i] / axes.sum() * shape, j: first, k: second}
+            sign = (i - j) * (j - k) * (k - i) / 2
+            C += sign * np.einsum("q,qa,qb,qc->abc", cell.weights, rows[0], rows[1], rows[2])
         # For each axis first the one before it, then the axis itself and the one that follows.
         self._turned = [C.transpose(np.roll(range(3), 1 - axis)).reshape(n, n * n) for axis in range(3)]
 
@@ -160,7 +159,7 @@ class CapVolume:
 
     def traction(self, x: Floats) -> Floats:
         """Return what a unit pressure pushes the rim with, ``(1, n, 3)``."""
-        return self._on_rim(_tractions(self._places(x), self._cell))
+        return self._on_rim(_tractions(self._cap.places(x - self._origin)[self._cap.faces], self._cell))
 
     def hessian(self, x: Floats) -> Floats:
         """Return the second derivatives, ``(1, 3 n, 3 n)``."""
@@ -271,8 +270,8 @@ class RevolvedVolume:
 
 
 def _products(a: Floats, b: Floats) -> Floats:
-    """Return ``a_i b_j`` of each edge or face, ``(k, n²)``."""
-    return (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
+    """Return ``a_i b_j`` of each edge, ``(k, 9)``."""
+    return (a[:, :, None] * b[:, None, :]).reshape(-1, 9)
 
 
 def _by_component(x: Floats, faces: Ints) -> Floats:
@@ -281,6 +280,6 @@ def _by_component(x: Floats, faces: Ints) -> Floats:
 
 
 def _tractions(places: Floats, cell: Cell) -> Floats:
-    """Return ∫ N n dA over faces with nodes at `places` ``(3, k, n)``, by their nodes, ``(k, n, 3)``."""
-    first, second = np.einsum("qar,ika->rkqi", cell.gradient_at_quadrature, places)
-    return np.asarray(np.einsum("q,qa,kqi->kai", cell.weights, cell.shape_at_quadrature, np.cross(first, second)))
+    """Return ∫ N n dA over faces with nodes at `places` ``(k, n, 3)``, by their nodes, ``(k, n, 3)``."""
+    _, normals = face_frames(places)
+    return np.asarray(np.einsum("q,qa,kqi->kai", cell.weights, cell.shape_at_quadrature, normals))

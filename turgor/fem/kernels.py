@@ -389,7 +389,7 @@ def element_stiffness(  # type: ignore[no-untyped-def]
             for at in range(len(places)):
                 packed[e, at] = flat[places[at]]
             if len(gradient):
-                # As a slice, it would take five seconds more to compile.
+                # As a slice, it takes far longer to compile.
                 for k in range(modes.shape[2]):
                     for i in range(d):
                         for a in range(n):

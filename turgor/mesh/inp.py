@@ -41,6 +41,9 @@ FACES = {
 _BLOCK = re.compile(r"^\*(?!\*)", re.MULTILINE)
 """What begins a block: a star, of which two are a comment."""
 
+_INCLUDE = re.compile(r"\s*INCLUDE\s*(,|$)", re.IGNORECASE | re.MULTILINE)
+"""How a block begins that includes a file: the rows of all others are taken apart only once."""
+
 _DEEPEST = 8
 """Files that include each other, one in the other."""
 
@@ -90,8 +93,11 @@ def whole_text(path: Path, depth: int = 0) -> str:
     head, *blocks = _BLOCK.split(path.read_text(encoding="utf-8", errors="replace"))
     parts = [head]
     for block in blocks:
-        keyword, options, _ = _taken_apart(block)
-        parts.append(whole_text(_included(path, options), depth + 1) if keyword == "INCLUDE" else f"*{block}")
+        if _INCLUDE.match(block):
+            _, options, _ = _taken_apart(block)
+            parts.append(whole_text(_included(path, options), depth + 1))
+        else:
+            parts.append(f"*{block}")
     return "".join(part if part.endswith("\n") or not part else f"{part}\n" for part in parts)
 
 

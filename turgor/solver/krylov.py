@@ -202,16 +202,16 @@ def _orthogonalised(basis: Floats, direction: Floats) -> Floats:
     """Take from `direction`, in place, its parts along the rows of `basis`; return these and the length left."""
     parts = np.zeros(len(basis) + 1)
     for _ in range(2):
-        *part, square = _products(basis, direction)
-        parts[:-1] += part
-        parts[-1] = np.sqrt(_add_combined(basis, -np.array(part), direction))
-        if parts[-1] > CANCELLED * np.sqrt(square):
+        products = _products(basis, direction)
+        parts[:-1] += products[:-1]
+        parts[-1] = np.sqrt(_add_combined(basis, -products[:-1], direction))
+        if parts[-1] > CANCELLED * np.sqrt(products[-1]):
             break
     return parts
 
 
 def _length(vector: Floats) -> float:
-    return float(np.sqrt(_products(vector[:0].reshape(0, len(vector)), vector)[0]))
+    return float(np.sqrt(_products(np.empty((0, len(vector))), vector)[0]))
 
 
 def _products(basis: Floats, vector: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from turgor.materials.hyperelastic import StretchModel, modulus, number
-from turgor.materials.kinematics import IDENTITY, Array
+from turgor.materials.kinematics import Array, diagonal_matrices
 
 _SMALLEST = 1e-5
 """A release of smaller magnitude is taken for this one."""
@@ -54,4 +54,4 @@ class ExtendedTube(StretchModel):
         dW = 2.0 * slope * stretches - 2.0 * self.Ge / beta * power * stretches
         diagonal = 2.0 * slope + 2.0 * self.Ge * (beta + 1.0) / beta * power
         outer = stretches[..., :, None] * stretches[..., None, :]
-        return W, dW, 4.0 * bend[..., None] * outer + diagonal[..., None] * IDENTITY
+        return W, dW, 4.0 * bend[..., None] * outer + diagonal_matrices(diagonal)
