@@ -54,7 +54,7 @@ def rolled_up(bars: float) -> str:
     (bending,) = system.bending
     x, y, z = mesh.points.T
     circle = np.column_stack([(radius - z) * np.sin(x / radius), y, radius - (radius - z) * np.cos(x / radius)])
-    state = system.consistent(circle - mesh.points, system.loads_at(0.0))
+    state = system.consistent(circle - mesh.points, system.loading.at(0.0))
     # Half a bar at each end belongs to no joint.
     energy = bending.energy(state) / (0.5 / radius**2 * (length - system.fibres[0].length[0]))
     moments = bending.moment(state.u) * radius

@@ -71,7 +71,7 @@ def random_state(system: System, size: float, seed: int = 0, fraction: float = 0
     """A random displacement of a given size with the dilatations that belong to it."""
     u = size * np.random.default_rng(seed).standard_normal(system.mesh.points.shape)
     assert system.worst_jacobian(u)[0] > 0.05
-    return system.consistent(u, system.loads_at(fraction))
+    return system.consistent(u, system.loading.at(fraction))
 
 
 def shifted(state: State, direction: np.ndarray, step: float) -> State:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turgor.fem.loads import Pressure
 from turgor.fem.system import System
 from turgor.materials.stability import drucker_margin
 from turgor.solver.linear import make_linear_solver
@@ -113,5 +112,5 @@ def limit_is_confirmed(system: System, error: LimitPressureError) -> bool:
 
 def reached_pressure(system: System, found: Equilibrium) -> float:
     """Return the pressure in the cavities of an equilibrium, MPa."""
-    values = [v for load, v in zip(system.loads, found.state.loads, strict=True) if isinstance(load, Pressure)]
+    values = [found.state.loads[cavity.channel] for cavity in system.cavities]
     return float(max(values))

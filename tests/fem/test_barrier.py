@@ -46,7 +46,7 @@ def near(system: System, left: float, noise: float = 4e-4):
     up = system.mesh.points[:, -1]
     u = np.zeros_like(system.mesh.points)
     u[up > 1.1, -1] = left - 0.2
-    return system.consistent(u + noise * np.random.default_rng(1).standard_normal(u.shape), system.loads_at(1.0))
+    return system.consistent(u + noise * np.random.default_rng(1).standard_normal(u.shape), system.loading.at(1.0))
 
 
 def check(term, state):
@@ -111,7 +111,7 @@ def test_a_body_that_gives_way_or_moves_is_a_part_of_the_potential(led):
     u[:-1, 2] = -0.18
     u[:-1] += 2e-4 * np.random.default_rng(3).standard_normal(mesh.points.shape)
     u[-1] = 0.02 * np.array([0.3, 0.1, 1.0])
-    state = system.consistent(u, system.loads_at(1.0))
+    state = system.consistent(u, system.loading.at(1.0))
     assert system.touches(state)[0].displacement == pytest.approx(u[-1])
     direction = np.random.default_rng(4).standard_normal(u.shape)
     more, less = (system.energy(shifted(state, direction, h)) for h in (1e-7, -1e-7))

@@ -40,7 +40,7 @@ def helix(radius, pitch, turns, centre):
 
 def energy(system, u):
     (bending,) = system.bending
-    return bending.energy(system.consistent(u, system.loads_at(0.0)))
+    return bending.energy(system.consistent(u, system.loading.at(0.0)))
 
 
 CURVED = {
@@ -70,7 +70,7 @@ def test_rest_is_free_of_moment_and_rotations_change_nothing(name):
     for u in (np.zeros_like(points), turned - points + [1.0, 2.0, 3.0]):
         assert bending.moment(u).max() < 1e-12
         force = np.zeros_like(points)
-        bending.force(system.consistent(u, system.loads_at(0.0)), force)
+        bending.force(system.consistent(u, system.loading.at(0.0)), force)
         assert np.abs(force).max() < 1e-11
     u = random_state(system, 0.02).u
     rotated = (points + u) @ Rotation.from_rotvec([0.7, -1.1, 2.0]).as_matrix().T - points

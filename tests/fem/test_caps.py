@@ -146,4 +146,4 @@ def test_a_cap_between_two_parallel_planes_of_symmetry_is_refused():
 def test_a_force_and_a_pressure_both_count(open_box):
     system = system_of(open_box, "cavity", [Clamped("z0")], [Force("x1", (0.0, 0.0, 1.0))])
     assert len(system.cavities[0].caps) == 1
-    assert system.load_names == ("pressure:cavity", "force:x1")
+    assert system.loading.names == ("pressure:cavity", "force:x1")

@@ -56,7 +56,7 @@ def test_a_margin_is_a_gap_that_presses_as_an_overlap_does(kind):
     found = []
     for gap, margin in ((-0.05, 0.0), (0.01, 0.06)):
         system = stacked(gap, kind)
-        state = system.consistent(np.zeros_like(system.mesh.points), system.loads_at(0.0), margin=margin)
+        state = system.consistent(np.zeros_like(system.mesh.points), system.loading.at(0.0), margin=margin)
         found.append((system.contacts[0].energy(state), system.contacts[0].touch(state), state.lagged[1]))
     (energy, touch, lagged), (wide_energy, wide, wide_lagged) = found
     assert energy > 1e-3
@@ -99,7 +99,7 @@ def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room(kind
     pattern = system.pattern
     lift = np.where(system.mesh.points[:, 2] > 1.2, -1.55, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
     noise = 0.008 * np.random.default_rng(1).standard_normal(lift.shape)
-    state = system.consistent(lift + noise, system.loads_at(0.7))
+    state = system.consistent(lift + noise, system.loading.at(0.7))
     assert all(touch.overlap > 1e-3 for touch in system.touches(state))
     system.stiffness(state)
     assert system.pattern is not pattern
@@ -108,7 +108,7 @@ def test_whole_stiffness_is_the_derivative_of_all_forces_and_finds_its_room(kind
     check_assembled(system, state, direction, 1e-6)
     # a state nearby finds room where there is some already
     pattern = system.pattern
-    system.stiffness(system.consistent(lift + 1.5 * noise, system.loads_at(0.7)))
+    system.stiffness(system.consistent(lift + 1.5 * noise, system.loading.at(0.7)))
     assert system.pattern is pattern
 
 

@@ -31,9 +31,9 @@ def pressed(friction: float = 0.0, kind: str = "tet10") -> System:
 def test_forces_and_stiffness_are_derivatives_of_the_energy(friction, kind):
     system = pressed(friction, kind)
     noise = 0.008 * np.random.default_rng(2).standard_normal(system.constraints.value.shape)
-    state = system.consistent(system.nodal(system.free_part(noise)), system.loads_at(0.4))
+    state = system.consistent(system.nodal(system.free_part(noise)), system.loading.at(0.4))
     state = system.gripped(state, dragged=True)
-    state = system.gripped(system.consistent(1.1 * state.u, system.loads_at(0.5), 1.0, state.grips), dragged=False)
+    state = system.gripped(system.consistent(1.1 * state.u, system.loading.at(0.5), 1.0, state.grips), dragged=False)
     assert system.touches(state)[0].overlap > 1e-3
     direction = system.nodal(np.random.default_rng(4).standard_normal(system.n_dofs))
     assert np.linalg.norm(direction[-1]) > 0.1  # the body moves too, along its spring

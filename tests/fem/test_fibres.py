@@ -97,7 +97,7 @@ def test_uniform_strain_is_felt_by_every_bar():
     force = 30.0 * np.pi * 0.2**2 / 4 * strain
     np.testing.assert_allclose(fibre.tension(u), force, rtol=1e-10)
     energy = 0.5 * force * strain * fibre.length.sum()
-    assert fibre.energy(system.consistent(u, system.loads_at(0.0))) == pytest.approx(energy)
+    assert fibre.energy(system.consistent(u, system.loading.at(0.0))) == pytest.approx(energy)
 
 
 def test_a_fibre_shares_the_load_of_a_bar():

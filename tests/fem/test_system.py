@@ -68,7 +68,7 @@ def test_oblique_sliding_equals_the_straight_one_seen_from_a_turned_frame():
     assert len(straight.constraints.frame_nodes) == 0
     results = []
     for system in (straight, oblique):
-        state = system.reference_state().with_loads(system.loads_at(1.0))
+        state = system.reference_state().with_loads(system.loading.at(1.0))
         matrix = full_matrix(system, system.stiffness(state))
         right = system.free_part(system.forces(state)[0])
         results.append(system.nodal(np.linalg.solve(matrix, -right)))

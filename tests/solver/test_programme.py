@@ -42,7 +42,7 @@ def ring(programme, pressure=0.02):
 
 def test_the_path_goes_up_and_down_and_hits_what_is_asked():
     system = ring(UP_AND_DOWN)
-    assert system.kinks == (0.3, 0.6)
+    assert system.loading.kinks == (0.3, 0.6)
     found = solve_path(system, [0.15, 0.5, 0.8, 1.0])
     assert [e.fraction for e in found] == [0.15, 0.5, 0.8, 1.0]
     assert [float(e.state.loads[0]) for e in found] == pytest.approx([0.01, 0.02, 0.0125, 0.005])

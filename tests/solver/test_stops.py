@@ -38,7 +38,7 @@ def grown(system, stretch):
     points = system.mesh.points
     radius = np.linalg.norm(points, axis=1)
     u = points * (((radius**3 + stretch**3 - 1) ** (1 / 3) / radius) - 1)[:, None]
-    return Equilibrium(system.consistent(u, system.loads_at(1.0)), 1.0, (0.0,), 1, 0)
+    return Equilibrium(system.consistent(u, system.loading.at(1.0)), 1.0, (0.0,), 1, 0)
 
 
 def test_a_material_is_blamed_where_it_is_least_stable():
@@ -79,7 +79,7 @@ def test_a_distorted_element_is_blamed_with_its_place():
         if smallest < 0.25:
             break
     assert smallest > 0.0
-    state = system.consistent(u, system.loads_at(1.0))
+    state = system.consistent(u, system.loading.at(1.0))
     error = stopped(
         system, Equilibrium(state, 1.0, (0.0,), 1, 0), NotConvergedError("an element would turn inside out")
     )
@@ -102,7 +102,7 @@ def test_a_crease_is_told_from_a_distorted_element():
     system = System(mesh, {"body": neo_hookean()}, supports, section=PlaneStrain())
     for stretch, outcome in ((0.66, Outcome.UNEXPLAINED), (0.63, Outcome.CREASE)):
         u = mesh.points * [stretch - 1.0, 1.0 / stretch - 1.0]
-        here = Equilibrium(system.consistent(u, system.loads_at(1.0)), 1.0, (0.0,), 1, 0)
+        here = Equilibrium(system.consistent(u, system.loading.at(1.0)), 1.0, (0.0,), 1, 0)
         error = stopped(system, here, NotConvergedError("an element would turn inside out"))
         assert error.outcome is outcome
     assert error.facts["creased_at_mm"][1] == pytest.approx(1.0)

@@ -56,7 +56,7 @@ def test_one_more_solution_with_the_same_tangent_makes_the_third_order(tube):
         force, scale = tube.forces(start)
         progress = Progress(NewtonOptions())
         progress.residuals.append(float(np.linalg.norm(force)) / scale)
-        tangent = Tangent(tube, linear, start, 1.0, None, tube.growth(1.0), progress)
+        tangent = Tangent(tube, linear, start, 1.0, None, tube.loading.growth(1.0), progress)
         newton = tangent.solved(tube.free_part(force), None)
         middle = tube.advanced(start, newton.du)
         again = tangent.solved_again(middle, 1.0, 1.0)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.common.errors import InputError
 from turgor.fem.programme import CONSTANT, PROPORTIONAL, Programme
-from turgor.fem.section import Section, surface_areas
+from turgor.fem.section import Section, in_section, surface_areas
+from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.term import NO_NODES, Unlagged
 from turgor.mesh.cells import body_cell, face_cell
+from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -58,7 +62,8 @@ class Force:
     programme: Programme = PROPORTIONAL
 
 
-Load = Pressure | Gravity | Traction | Force
+Dead = Gravity | Traction | Force
+Load = Pressure | Dead
 
 
 class DeadLoad(Unlagged):
@@ -99,20 +104,39 @@ class DeadLoad(Unlagged):
         """Fill nothing: a dead load has no stiffness."""
 
 
-def body_force(cells: Ints, dV: Floats, density: float, acceleration: Floats, out: Floats) -> None:
-    """Add the nodal forces ``∫ ρ g N dV`` of `cells` ``(m, n)`` to ``out (n_points, d)``.
+def add_nodal_forces(load: Dead, mesh: Mesh, section: Section | None, solids: Sequence[Solid], out: Floats) -> None:
+    """Add the nodal forces of a dead load at factor one to ``out (n_points, d)``, N.
 
-    `dV` ``(m, q)`` are the volumes at the quadrature points and `density` is in t/mm³.
+    Raises
+    ------
+    InputError
+        If gravity acts on a solid without density, or the load's vector does not fit the section.
     """
-    share = dV @ body_cell(cells).shape_at_quadrature
-    mass = density * np.bincount(cells.ravel(), share.ravel(), minlength=len(out))
-    out += mass[:, None] * acceleration
+    if isinstance(load, Gravity):
+        acceleration = in_section(load.acceleration, mesh, section, "gravity", total=True)
+        for solid in solids:
+            if solid.material.density is None:
+                raise InputError("gravity acts on a material without density", key="density")
+            _add_body_force(solid.nodes, solid.dV, solid.material.density * acceleration, out)
+        return
+    total = isinstance(load, Force)
+    vector = in_section(load.vector, mesh, section, f"loads.{load.surface}", total)
+    faces = mesh.surface(load.surface)
+    if total:
+        vector = vector / float(surface_areas(mesh.points, faces, section)[1].sum())
+    _add_surface_force(mesh.points, faces, vector, section, out)
 
 
-def surface_force(points: Floats, faces: Ints, traction: Floats, section: Section | None, out: Floats) -> float:
-    """Add the nodal forces ``∫ t N dA`` of a dead traction to ``out (n_points, d)`` and return the area, mm²."""
+def _add_surface_force(points: Floats, faces: Ints, traction: Floats, section: Section | None, out: Floats) -> None:
+    """Add the nodal forces ``∫ t N dA`` of a dead traction to ``out (n_points, d)``."""
     _, area = surface_areas(points, faces, section)
     share = area @ face_cell(faces).shape_at_quadrature
     lumped = np.bincount(faces.ravel(), share.ravel(), minlength=len(out))
     out += lumped[:, None] * traction
-    return float(area.sum())
+
+
+def _add_body_force(cells: Ints, dV: Floats, density: Floats, out: Floats) -> None:
+    """Add the nodal forces ``∫ f N dV`` of `cells` ``(m, n)`` under a force density ``(d,)``, N/mm³."""
+    share = dV @ body_cell(cells).shape_at_quadrature
+    volume = np.bincount(cells.ravel(), share.ravel(), minlength=len(out))
+    out += volume[:, None] * density

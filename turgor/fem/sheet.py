@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.common.errors import InputError
 from turgor.fem.kernels import PACK
+from turgor.fem.section import PlaneStress, Section
 from turgor.fem.solid import TANGENT_SIZE, Solid
 from turgor.fem.state import State
+from turgor.materials.hyperelastic import Hyperelastic
+from turgor.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 
@@ -114,3 +120,27 @@ class Sheet(Solid):
             for s in IN_PLANE:
                 if s >= r:
                     tangent[:, PACK[r, s]] -= tangent[:, PACK[r, ACROSS]] * tangent[:, PACK[s, ACROSS]] / across
+
+
+def solids_of(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section | None) -> list[Solid]:
+    """Return a solid for each region of a mesh, given its material by name; in plane stress they are sheets.
+
+    Raises
+    ------
+    InputError
+        If a region has no material or a material no region.
+    """
+    for name in materials:
+        mesh.region(name)
+    missing = sorted(set(mesh.regions) - set(materials))
+    if missing:
+        raise InputError(
+            f"no material is given for region '{missing[0]}'",
+            key="materials",
+            expected=f"one for each of {', '.join(mesh.regions)}",
+        )
+    kind = Sheet if isinstance(section, PlaneStress) else Solid
+    return [
+        kind(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material, section)
+        for name, material in materials.items()
+    ]

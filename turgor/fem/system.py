@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.blas import dense_products_on_one_thread
-from turgor.common.errors import InputError
-from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.anisotropic import FibreFamily, SpreadFibres
 from turgor.fem.bending import FibreBending
 from turgor.fem.cavity import Cavity
@@ -22,12 +20,12 @@ from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
 from turgor.fem.held import check_held, check_rim
-from turgor.fem.loads import DeadLoad, Force, Gravity, Load, Pressure, Traction, body_force, surface_force
+from turgor.fem.loading import Loading
+from turgor.fem.loads import Dead, DeadLoad, Load, Pressure, add_nodal_forces
 from turgor.fem.membrane import BondedMembrane, Membrane
 from turgor.fem.pattern import BlockLayout, SparsePattern, packed_size
-from turgor.fem.programme import PROPORTIONAL, LoadLine, Programme
-from turgor.fem.section import PlaneStress, Section, check_section, in_section
-from turgor.fem.sheet import Sheet
+from turgor.fem.section import Section, check_section
+from turgor.fem.sheet import solids_of
 from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, SpringBed, Support
@@ -55,7 +53,7 @@ class System:
     supports
         What holds the body.
     loads
-        What acts on it; each has one value in ``State.loads``, named in :attr:`load_names`.
+        What acts on it; each has one value in ``State.loads``, in the order of :attr:`loading`.
     reinforcements
         What is embedded in the body or laid on it.
     section
@@ -85,11 +83,8 @@ class System:
         check_section(mesh, section)
         self.mesh = mesh
         self.section = section
-        self.solids = _solids(mesh, materials, section)
-        moving = [c for c in contact if isinstance(c, RigidContact) and c.is_load]
-        self.loads = (*loads, *moving)
-        self.load_names = _load_names(self.loads)
-        self._programmes = [_programme(load) for load in self.loads]
+        self.solids = solids_of(mesh, materials, section)
+        self.loading = Loading([*loads, *(c for c in contact if isinstance(c, RigidContact) and c.is_load)])
         self.supports = tuple(supports)
         self.held = [s for s in supports if isinstance(s, (Clamped, Sliding, Prescribed))]
         springs = [s for s in supports if isinstance(s, ElasticSupport)]
@@ -102,7 +97,7 @@ class System:
         self._unknown_bodies = [c for c in contact if isinstance(c, RigidContact) and c.is_unknown]
         self.constraints = with_bodies(self.constraints, [led(c, mesh, section) for c in self._unknown_bodies])
         bodies = self._springs()
-        self.cavities = [self._cavity(load, k) for k, load in enumerate(self.loads) if isinstance(load, Pressure)]
+        self.cavities = [self._cavity(load, k) for k, load in enumerate(loads) if isinstance(load, Pressure)]
         caps = [cap for cavity in self.cavities for cap in cavity.caps]
         dead = [self._dead_load(load, k) for k, load in enumerate(loads) if not isinstance(load, Pressure)]
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
@@ -138,33 +133,11 @@ class System:
 
     def reference_state(self) -> State:
         """Return the undeformed state without loads."""
-        return self.consistent(self._rest, np.zeros(len(self.loads)))
+        return self.consistent(self._rest, np.zeros(len(self.loading.names)))
 
     def body_part(self, field: Floats) -> Floats:
         """Return the nodes' part ``(n_points, d)`` of a field like ``State.u``: behind it are bodies on springs."""
         return field[: self.mesh.n_points]
-
-    def loads_at(self, fraction: float) -> Floats:
-        """Return the loads ``(n_loads,)`` at a load fraction, each along its programme."""
-        return np.array([full * programme.at(fraction) for full, programme in self._programmes])
-
-    def growth(self, fraction: float) -> Floats:
-        """Return the derivatives of the loads ``(n_loads,)`` by the load fraction."""
-        return np.array([full * programme.slope(fraction) for full, programme in self._programmes])
-
-    def line_at(self, fraction: float) -> LoadLine:
-        """Return the straight line that the loads follow at a load fraction, at a kink the later one."""
-        return LoadLine(fraction, self.loads_at(fraction), self.growth(fraction))
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """The load fractions within (0, 1) at which a load's programme changes its slope, ascending."""
-        return tuple(sorted({f for _, programme in self._programmes for f in programme.kinks if 0.0 < f < 1.0}))
-
-    @property
-    def loaded_at_start(self) -> bool:
-        """Whether something acts already at load fraction zero (weight)."""
-        return bool(np.any(self.loads_at(0.0)))
 
     def conjugate(self, state: State, growth: Floats | None = None) -> float:
         """Return −∂Π/∂f, f the load fraction: what the loads that grow with it work on, N mm (pressure × volume).
@@ -172,7 +145,7 @@ class System:
         `growth` are the derivatives of the loads by f ``(n_loads,)``; left out, those at the start. Other weights
         give another measure of the state: a single one at a cavity its volume.
         """
-        growth = self.growth(0.0) if growth is None else growth
+        growth = self.loading.growth(0.0) if growth is None else growth
         return sum(float(growth[term.channel]) * term.conjugate(state) for term in self._loaded)
 
     def load_direction(self, state: State, growth: Floats | None = None) -> Floats:
@@ -180,7 +153,7 @@ class System:
 
         It is also −∂Q/∂u of the conjugate Q of the same `growth`.
         """
-        growth = self.growth(0.0) if growth is None else growth
+        growth = self.loading.growth(0.0) if growth is None else growth
         total = np.zeros_like(state.u)
         for term in self._loaded:
             part = np.zeros_like(state.u)
@@ -398,8 +371,9 @@ class System:
         return nodes, packed
 
     def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
-        pressure = max((abs(load.value) for load in self.loads if isinstance(load, Pressure)), default=0.0)
-        channel = self.loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
+        loads = self.loading.loads
+        pressure = max((abs(load.value) for load in loads if isinstance(load, Pressure)), default=0.0)
+        channel = loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
         return make_contact(self.mesh, materials, case, pressure, channel, self.section, number, self._row(case))
 
     @property
@@ -425,61 +399,7 @@ class System:
         solid = next(solid for solid in self.solids if np.array_equal(solid.index, cells))
         return SpreadFibres(self.mesh, solid, family)
 
-    def _dead_load(self, load: Gravity | Traction | Force, channel: int) -> DeadLoad:
+    def _dead_load(self, load: Dead, channel: int) -> DeadLoad:
         nodal = self._rest
-        if isinstance(load, Gravity):
-            acceleration = in_section(load.acceleration, self.mesh, self.section, "gravity", total=True)
-            for solid in self.solids:
-                if solid.material.density is None:
-                    raise InputError("gravity acts on a material without density", key="density")
-                body_force(solid.nodes, solid.dV, solid.material.density, acceleration, nodal)
-        else:
-            total = isinstance(load, Force)
-            vector = in_section(load.vector, self.mesh, self.section, f"loads.{load.surface}", total)
-            area = surface_force(self.mesh.points, self.mesh.surface(load.surface), vector, self.section, nodal)
-            if total:
-                nodal /= area
+        add_nodal_forces(load, self.mesh, self.section, self.solids, nodal)
         return DeadLoad(nodal, channel)
-
-
-def _solids(mesh: Mesh, materials: Mapping[str, Hyperelastic], section: Section | None) -> list[Solid]:
-    for name in materials:
-        mesh.region(name)
-    missing = sorted(set(mesh.regions) - set(materials))
-    if missing:
-        raise InputError(
-            f"no material is given for region '{missing[0]}'",
-            key="materials",
-            expected=f"one for each of {', '.join(mesh.regions)}",
-        )
-    kind = Sheet if isinstance(section, PlaneStress) else Solid
-    return [
-        kind(mesh.points, mesh.cells[mesh.region(name)], np.asarray(mesh.region(name), np.intp), material, section)
-        for name, material in materials.items()
-    ]
-
-
-def _programme(load: Load | RigidContact) -> tuple[float, Programme]:
-    """Return a load's full value and how it follows the load fraction."""
-    if isinstance(load, RigidContact):
-        return 1.0, PROPORTIONAL
-    return load.value if isinstance(load, Pressure) else 1.0, load.programme
-
-
-def _load_names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:
-    names: list[str] = []
-    for load in loads:
-        if isinstance(load, Pressure):
-            name = PRESSURE_PREFIX + load.cavity
-        elif isinstance(load, Gravity):
-            name = "gravity"
-        elif isinstance(load, RigidContact):
-            name = f"motion:{load.name}"
-        else:
-            name = f"{type(load).__name__.lower()}:{load.surface}"
-        if name in names and isinstance(load, Pressure):
-            raise InputError(
-                "the cavity is given two pressures", key="loads", value=load.cavity, expected="one for each cavity"
-            )
-        names.append(name if name not in names else f"{name}#{names.count(name) + 1}")
-    return tuple(names)

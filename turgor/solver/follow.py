@@ -88,7 +88,7 @@ def follow(
     walk.longest = options.largest_step * abs(targets[-1] - begin)
     walk.step = walk.first_step = sign * _first_step(begin, targets)
     post = _Post(walk, on_equilibrium)
-    if start is None and system.loaded_at_start:
+    if start is None and system.loading.acts_at_start:
         post.send(walk.here)
     with _telling_why(walk, post, ALONG_THE_ARC if isinstance(quantity, Volume) else None):
         for target in targets:
@@ -152,7 +152,7 @@ def follow_arc(
     scale = abs(target - rest)
     sign = _direction(walk.measure(walk.here), [target], start is not None)
     post = _Post(walk, on_equilibrium)
-    if start is None and system.loaded_at_start:
+    if start is None and system.loading.acts_at_start:
         post.send(walk.here)
     parts = math.ceil(length / options.largest_step)
     arc = _Arc(walk, sign, scale, length / parts)
@@ -319,7 +319,7 @@ class _Post:
 def _walk_from(system: System, quantity: Quantity, options: PathOptions, start: Equilibrium | None) -> VolumeWalk:
     if system.constraints.moves:
         raise InputError("given displacements cannot grow where the load is what it must be", key="control")
-    if system.kinks:
+    if system.loading.kinks:
         raise InputError("loads with a programme follow time, not a volume", key="control")
     if system.rubs:
         raise InputError("friction follows the path of the loads, not a volume", key="control")
@@ -340,7 +340,7 @@ def settled(system: System, linear: StiffnessSolver, options: NewtonOptions) -> 
         If there is none.
     """
     rest = Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
-    if not system.loaded_at_start:
+    if not system.loading.acts_at_start:
         return rest
     try:
         return kept_apart(system, lambda state: find_equilibrium(system, linear, state, 0.0, options), rest.state)

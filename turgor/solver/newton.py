@@ -141,7 +141,7 @@ def find_equilibrium(
     NotConvergedError
         With the residual history and the worst element, if no equilibrium is reached.
     """
-    line = line or system.line_at(fraction)
+    line = line or system.loading.line_at(fraction)
     state = guess.with_loads(line.at(fraction))
     pending = system.constraints.imposed(state.u, fraction) - state.u
     moving = bool(np.any(pending))

@@ -136,11 +136,11 @@ def solve_path(
 
     walk = _Walk(system, options or PathOptions(), start, deliver, on_progress)
     try:
-        if start is None and system.loaded_at_start:
+        if start is None and system.loading.acts_at_start:
             walk.settle()
             walk.deliver()
         for fraction in wanted:
-            for stop in (*(kink for kink in system.kinks if kink < fraction), fraction):
+            for stop in (*(kink for kink in system.loading.kinks if kink < fraction), fraction):
                 walk.to(stop)
             walk.deliver()
     except NotConvergedError as error:
@@ -201,7 +201,7 @@ class _Walk:
                 past = () if found.event is Event.POST_SNAP else (*self.past, self.here)[-2:]
                 self._arrive(found)
                 self.past = past
-        if target in self.system.kinks:
+        if target in self.system.loading.kinks:
             # Beyond it the path turns: what lies before says nothing of the direction.
             self.past = ()
 
@@ -233,7 +233,7 @@ class _Walk:
 
     def _bifurcated(self, found: Equilibrium) -> Equilibrium:
         """Mark the first state behind a bifurcation: the inertia has changed, and the load has no limit there."""
-        mode = softest_mode(self.system, self.linear, found.state, self.system.growth(found.fraction))
+        mode = softest_mode(self.system, self.linear, found.state, self.system.loading.growth(found.fraction))
         log.warning("bifurcation between %.5g and %.5g of the load", self.here.fraction, found.fraction)
         return replace(found, event=Event.BIFURCATION, mode=mode)
 
@@ -247,7 +247,7 @@ class _Walk:
         system, linear, here = self.system, self.linear, self.here
         if system.is_moved:
             return False
-        growth = system.growth(here.fraction)
+        growth = system.loading.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
         mean = (after - before) / (found.fraction - here.fraction)
         if abs(after - before) <= LARGE_CHANGE * abs(before) and not self._is_steep(mean, found, growth):
@@ -307,7 +307,7 @@ class _Walk:
             If it has one that cannot be located.
         """
         log.info("going on by volume control from %.4g", self.here.fraction)
-        system, quantity = self.system, Volume(self.system.growth(self.here.fraction))
+        system, quantity = self.system, Volume(self.system.loading.growth(self.here.fraction))
         rest = self.past[-1].state if self.past else system.reference_state()
         now, then = (system.conjugate(state, quantity.weights) for state in (self.here.state, rest))
         step = 0.5 * abs(now - then) or 0.05 * abs(now)

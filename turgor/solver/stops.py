@@ -9,7 +9,6 @@ import numpy as np
 from turgor.common.errors import SolverError
 from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.contact.term import LARGEST_OVERLAP
-from turgor.fem.loads import Pressure
 from turgor.fem.surface import surface_stretches
 from turgor.fem.system import System
 from turgor.materials.stability import drucker_margin, verdict
@@ -129,8 +128,8 @@ def at_limit(
 
 def _beyond(system: System, limit: Equilibrium) -> str:
     """Say how the actuator goes on behind a limit: the conjugate of the load grows further while the load falls."""
-    pressures = [k for k, load in enumerate(system.loads) if isinstance(load, Pressure)]
-    growth = system.growth(limit.fraction)
+    pressures = [cavity.channel for cavity in system.cavities]
+    growth = system.loading.growth(limit.fraction)
     if not np.any(growth[pressures]):
         return "gives way while the load falls"
     leading = pressures[int(np.argmax(np.abs(growth[pressures])))]
@@ -142,8 +141,8 @@ def _beyond(system: System, limit: Equilibrium) -> str:
 def load_facts(system: System, here: Equilibrium) -> Facts:
     """Return how far a path has come, in plain values: the load fraction and every load with its unit."""
     facts: Facts = {"last_fraction": here.fraction, "last_stable": here.stable}
-    for load, name, value in zip(system.loads, system.load_names, here.state.loads, strict=True):
-        pressure = isinstance(load, Pressure)
+    for name, value in zip(system.loading.names, here.state.loads, strict=True):
+        pressure = name.startswith(PRESSURE_PREFIX)
         facts[f"{name}_kPa" if pressure else name] = float(value) * (1e3 if pressure else 1.0)
     return facts
 

@@ -121,7 +121,7 @@ class VolumeWalk:
         self.linear = linear
         self.options = options
         self.quantity = quantity or Volume()
-        self.line = system.line_at(start.fraction)
+        self.line = system.loading.line_at(start.fraction)
         self.longest, self.smallest_part = longest, smallest_part
         self.here = start if start.compliance is not None else self.with_compliance(start)
         self.before: Equilibrium | None = None
@@ -331,7 +331,7 @@ def stable_while_held(system: System, quantity: Quantity, equilibrium: Equilibri
     """
     if equilibrium.negative_pivots is None or equilibrium.compliance is None or equilibrium.negative_pivots == 0:
         return equilibrium.stable
-    growth = system.growth(equilibrium.fraction)
+    growth = system.loading.growth(equilibrium.fraction)
     weights = growth if quantity.weights is None else quantity.weights
     signs = np.unique(np.sign(growth[weights != 0.0] * weights[weights != 0.0]))
     if len(signs) != 1:

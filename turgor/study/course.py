@@ -9,7 +9,6 @@ from typing import Protocol
 import numpy as np
 
 from turgor.common.errors import InputError
-from turgor.fem.loads import Pressure
 from turgor.fem.system import System
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Air, Quantity, Volume
@@ -144,7 +143,7 @@ def course_by(
         If there is no equilibrium under the weight alone.
     """
     channels = _channels(system, control.cavity)
-    weights = np.zeros(len(system.loads))
+    weights = np.zeros(len(system.loading.names))
     weights[channels] = 1.0
     rest = system.conjugate(system.reference_state(), weights)
     quantity: Quantity = Volume(weights)
@@ -154,14 +153,14 @@ def course_by(
             raise InputError(
                 "the air of several cavities is no single amount",
                 key="control.cavity",
-                expected=f"one of {', '.join(load.cavity for load in system.loads if isinstance(load, Pressure))}",
+                expected=f"one of {', '.join(cavity.name for cavity in system.cavities)}",
             )
-        full = float(system.growth(0.0)[channels[0]])
+        full = float(system.loading.growth(0.0)[channels[0]])
         quantity, scale = Air(full, control.surroundings, full * weights), control.surroundings
     target = volume_of(control.target, rest, "control.target")
     begin = _begin(system, quantity, options) / scale
     if abs(target - begin) < SAME * rest:
-        where = "under the weight alone" if system.loaded_at_start else "at rest"
+        where = "under the weight alone" if system.loading.acts_at_start else "at rest"
         raise InputError(f"the target is what there is {where}", key="control.target", value=control.target)
     if outputs is None:
         volumes = [float(v) for v in begin + (target - begin) * np.array(output_fractions(steps))]
@@ -175,7 +174,7 @@ def _begin(system: System, quantity: Quantity, options: PathOptions) -> float:
     """Return the value of a quantity before the loads grow."""
     newton = options.newton
     state = system.reference_state()
-    if system.loaded_at_start:
+    if system.loading.acts_at_start:
         state = settled(system, make_stiffness_solver(system, newton.linear), newton).state
     return quantity.value(system.conjugate(state, quantity.weights), 0.0)
 
@@ -194,7 +193,7 @@ def _volumes(outputs: Sequence[str], rest: float, begin: float, target: float) -
 
 
 def _channels(system: System, cavity: str | None) -> list[int]:
-    pressures = {load.cavity: k for k, load in enumerate(system.loads) if isinstance(load, Pressure)}
+    pressures = {cavity.name: cavity.channel for cavity in system.cavities}
     if cavity is not None and cavity not in pressures:
         expected = f"one of {', '.join(pressures)}" if pressures else "a load of type pressure"
         raise InputError("no pressure acts in this cavity", key="control.cavity", value=cavity, expected=expected)

@@ -55,7 +55,7 @@ def to_record(
     return StepRecord(
         index=index,
         fraction=fraction,
-        loads={name: float(value) for name, value in zip(system.load_names, state.loads, strict=True)},
+        loads={name: float(value) for name, value in zip(system.loading.names, state.loads, strict=True)},
         displacement=system.body_part(state.u),
         element_pressure=system.element_pressure(state),
         element_dilatation=system.dilatation(state),
@@ -166,7 +166,7 @@ def _touch(contact: Contact, state: State) -> dict[str, Any]:
 
 def to_equilibrium(system: System, record: StepRecord) -> Equilibrium:
     """Return the equilibrium that a record was made of, as a start for the solver."""
-    loads = np.array([record.loads[name] for name in system.load_names])
+    loads = np.array([record.loads[name] for name in system.loading.names])
     grips = tuple(np.array(rows).reshape(-1, WIDTH) for rows in record.solver["contact_grips"])
     bodies = np.array(record.solver.get("bodies_mm", [])).reshape(-1, system.mesh.dimension)
     u = np.vstack([record.displacement, bodies])

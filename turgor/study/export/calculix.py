@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from turgor.common.errors import InputError
-from turgor.fem.loads import surface_force
+from turgor.fem.loads import add_nodal_forces
 from turgor.materials import Hyperelastic
 from turgor.materials.models.arruda_boyce import ArrudaBoyce
 from turgor.materials.models.ogden import OgdenModel
@@ -130,8 +130,7 @@ def _nodal_forces(problem: Problem) -> np.ndarray[tuple[int, int], np.dtype[np.f
     """Return the consistent nodal forces ``(n_points, 3)`` of the tractions at the full load, N."""
     forces = np.zeros_like(problem.mesh.points)
     for load in problem.tractions:
-        faces = problem.mesh.surface(load.surface)
-        surface_force(problem.mesh.points, faces, np.array(load.vector), None, forces)
+        add_nodal_forces(load, problem.mesh, None, (), forces)
     return forces
 
 

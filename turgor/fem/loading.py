@@ -1,0 +1,89 @@
+"""All that acts on a system as functions of one load fraction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.common.errors import InputError
+from turgor.common.names import PRESSURE_PREFIX
+from turgor.fem.contact.spec import RigidContact
+from turgor.fem.loads import Gravity, Load, Pressure
+from turgor.fem.programme import PROPORTIONAL, LoadLine, Programme
+
+Floats = NDArray[np.float64]
+
+
+class Loading:
+    """The loads of a system, each along its programme.
+
+    Parameters
+    ----------
+    loads
+        In the order of ``State.loads``; a rigid body that moves is one, too.
+
+    Attributes
+    ----------
+    names
+        One for each load.
+
+    Raises
+    ------
+    InputError
+        If a cavity is given two pressures.
+    """
+
+    def __init__(self, loads: Sequence[Load | RigidContact]) -> None:
+        self.loads = tuple(loads)
+        self.names = _names(self.loads)
+        self._programmes = [_programme(load) for load in self.loads]
+
+    def at(self, fraction: float) -> Floats:
+        """Return the loads ``(n_loads,)`` at a load fraction."""
+        return np.array([full * programme.at(fraction) for full, programme in self._programmes])
+
+    def growth(self, fraction: float) -> Floats:
+        """Return the derivatives of the loads ``(n_loads,)`` by the load fraction."""
+        return np.array([full * programme.slope(fraction) for full, programme in self._programmes])
+
+    def line_at(self, fraction: float) -> LoadLine:
+        """Return the straight line that the loads follow at a load fraction, at a kink the later one."""
+        return LoadLine(fraction, self.at(fraction), self.growth(fraction))
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """The load fractions within (0, 1) at which a load's programme changes its slope, ascending."""
+        return tuple(sorted({f for _, programme in self._programmes for f in programme.kinks if 0.0 < f < 1.0}))
+
+    @property
+    def acts_at_start(self) -> bool:
+        """Whether something acts already at load fraction zero (weight)."""
+        return bool(np.any(self.at(0.0)))
+
+
+def _programme(load: Load | RigidContact) -> tuple[float, Programme]:
+    """Return a load's full value and how it follows the load fraction."""
+    if isinstance(load, RigidContact):
+        return 1.0, PROPORTIONAL
+    return load.value if isinstance(load, Pressure) else 1.0, load.programme
+
+
+def _names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:
+    names: list[str] = []
+    for load in loads:
+        if isinstance(load, Pressure):
+            name = PRESSURE_PREFIX + load.cavity
+        elif isinstance(load, Gravity):
+            name = "gravity"
+        elif isinstance(load, RigidContact):
+            name = f"motion:{load.name}"
+        else:
+            name = f"{type(load).__name__.lower()}:{load.surface}"
+        if name in names and isinstance(load, Pressure):
+            raise InputError(
+                "the cavity is given two pressures", key="loads", value=load.cavity, expected="one for each cavity"
+            )
+        names.append(name if name not in names else f"{name}#{names.count(name) + 1}")
+    return tuple(names)
