@@ -16,11 +16,17 @@ from turgor.materials.least_squares import FAR, Problem, Solution, bounds_of, ce
 from turgor.materials.measurement import MaterialTest
 
 _ITERATIONS = 60
+_FOUND = 1e-14
+"""Change of the logarithm of a lateral stretch below which Newton's method has found it."""
+
 _STARTS = (1.5, 5.0, 50.0)
 """Ratios of bulk to shear modulus from which compressible fits are searched."""
 
-_TRANSVERSE = {"uniaxial": (1, 2), "equibiaxial": (2,), "planar": (2,)}
-"""The directions in which each mode is free to contract."""
+_LOADED = {"uniaxial": np.array([1.0, 0, 0]), "equibiaxial": np.array([1.0, 1, 0]), "planar": np.array([1.0, 0, 0])}
+"""The directions that take the stretch of each mode."""
+
+_FREE = {"uniaxial": np.array([0, 1.0, 1]), "equibiaxial": np.array([0, 0, 1.0]), "planar": np.array([0, 0, 1.0])}
+"""Those in which it is free to contract."""
 
 
 def fit_bulk_modulus(material: Hyperelastic, tests: Sequence[MaterialTest]) -> Hyperelastic:
@@ -55,34 +61,40 @@ def free_response(material: Hyperelastic, mode: str, stretch: Array) -> tuple[Ar
 
     Notes
     -----
-    The lateral stress vanishes; it grows with the lateral stretch, whose root is found by bisection in its logarithm
-    between full incompressibility and no contraction at all, then by Newton's method.
+    The lateral stress vanishes. Its root is found by Newton's method in the logarithm of the lateral stretch, from that
+    of an incompressible material; bounds that close in on it halve what a step would leave.
     """
-    x = np.asarray(stretch, dtype=float)
-    low, high = np.full_like(x, np.log(1e-3)), np.full_like(x, np.log(1e3))
+    along, free = _LOADED[mode], _FREE[mode]
+    given = np.log(np.asarray(stretch, dtype=float))[:, None] * along
+    lateral = -given.sum(axis=1) / free.sum()
+    low, high = np.full_like(lateral, np.log(1e-3)), np.full_like(lateral, np.log(1e3))
     for _ in range(_ITERATIONS):
-        middle = 0.5 * (low + high)
-        lateral_stress = _principal_stress(material, mode, x, np.exp(middle))[..., 2]
-        above = lateral_stress > 0
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
-    lateral = np.exp(0.5 * (low + high))
-    return lateral, _principal_stress(material, mode, x, lateral)[..., 0]
+        stress, slope = _free_stress(material, given + lateral[:, None] * free, free)
+        above = stress[:, 2] > 0.0
+        low, high = np.where(above, low, lateral), np.where(above, lateral, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = lateral - stress[:, 2] / slope
+        before, lateral = lateral, np.where((low <= newton) & (newton <= high), newton, 0.5 * (low + high))
+        if np.abs(lateral - before).max(initial=0.0) <= _FOUND:
+            break
+    stress, _ = _free_stress(material, given + lateral[:, None] * free, free)
+    return np.exp(lateral), stress[:, 0] / stretch
 
 
-def _principal_stress(material: Hyperelastic, mode: str, stretch: Array, lateral: Array) -> Array:
-    """Nominal principal stresses ``(n, 3)``; the third direction is a free one."""
-    stretches = np.stack([stretch, np.ones_like(stretch), lateral], axis=-1)
-    if mode == "uniaxial":
-        stretches[..., 1] = lateral
-    elif mode == "equibiaxial":
-        stretches[..., 1] = stretch
-    J = stretches.prod(axis=-1)[..., None]
-    bar = stretches / np.cbrt(J)
-    _, slope, _ = material.principal(bar)
-    t = bar * slope
-    deviator = t - t.mean(axis=-1, keepdims=True)
-    stress: Array = (deviator + J * material.volumetric.pressure(J)) / stretches
-    return stress
+def _free_stress(material: Hyperelastic, logarithms: Array, free: Array) -> tuple[Array, Array]:
+    """Return the principal Kirchhoff stresses ``(n, 3)``, and the derivative of the third as the `free` ones grow.
+
+    By the logarithms of the stretches, ``(n, 3)``.
+    """
+    mean = logarithms.mean(axis=1, keepdims=True)
+    J, bar = np.exp(3.0 * mean), np.exp(logarithms - mean)
+    _, slope, curvature = material.principal(bar)
+    stress, turned = bar * slope, free - free.mean()
+    change = stress * turned + bar * (curvature @ (bar * turned)[..., None])[..., 0]
+    volume = J * material.volumetric.pressure(J)
+    growth = free.sum() * (volume + J**2 * material.volumetric.stiffness(J))
+    total = stress - stress.mean(axis=1, keepdims=True) + volume
+    return total, change[:, 2] - change.mean(axis=1) + growth[:, 0]
 
 
 def fit_compressible(
@@ -181,6 +193,6 @@ def _finite(residual: Array) -> Array:
 
 
 def _response(material: Hyperelastic, test: MaterialTest) -> tuple[Array, Array]:
-    if test.mode in _TRANSVERSE:
+    if test.mode in _FREE:
         return free_response(material, test.mode, test.stretch)
     return np.ones_like(test.stretch), predict(material, test)
