@@ -15,6 +15,7 @@ EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 ROWS = {2: "quadrilaterals", 3: "hexahedra"}
 SMALLER = {
     "honeycomb": ["geometry.rows=1", "geometry.depth=8 mm"],
+    "membrane": ["geometry.chamber_length=4 mm"],
     "reinforced-tube": ["geometry.rings=6", "geometry.length=50 mm", "geometry.cavity_length=30 mm"],
 }
 """Template → changes that leave its names and spare elements."""

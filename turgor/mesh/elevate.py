@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turgor.common.rows import row_numbers
 from turgor.mesh.cells import CELLS, Cell, Floats, Ints
 
 
@@ -55,7 +56,7 @@ def completed(points: Floats, cells: Ints, kind: Kind) -> tuple[Floats, Ints]:
     for group in _groups(shared):
         of_group = [k for k, nodes in enumerate(shared) if len(nodes) == group]
         keys = np.sort(np.stack([cells[:, shared[k]] for k in of_group], axis=1).reshape(-1, group), axis=1)
-        _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        _, first, inverse = np.unique(row_numbers(keys), return_index=True, return_inverse=True)
         places = np.einsum("kn,mni->mki", weights[of_group], points[cells])
         blocks.append(places.reshape(-1, points.shape[1])[first])
         columns.append(count + inverse.reshape(len(cells), len(of_group)))

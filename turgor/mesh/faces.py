@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from turgor.common.errors import InputError
+from turgor.common.rows import row_numbers
 from turgor.mesh.cells import Ints, body_cell, face_cell
 
 
@@ -19,7 +20,7 @@ def all_faces(cells: Ints) -> Ints:
 def boundary_faces(cells: Ints) -> Ints:
     """Return the outward faces that belong to one cell only, shape ``(k, nodes_per_face)``."""
     faces = all_faces(cells)
-    _, first, counts = np.unique(_keys(faces), axis=0, return_index=True, return_counts=True)
+    _, first, counts = np.unique(row_numbers(_keys(faces)), return_index=True, return_counts=True)
     boundary: Ints = faces[np.sort(first[counts == 1])]
     return boundary
 
@@ -38,7 +39,7 @@ def host_cells(cells: Ints, faces: Ints) -> Ints:
     corners = of_cells[:, : face_cell(faces).n_corners].T
     near = np.flatnonzero(np.logical_and.reduce([marked[nodes] for nodes in corners]))
     own, wanted = _rotated(of_cells[near]), _rotated(faces)
-    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
+    _, inverse = np.unique(row_numbers(np.vstack([own, wanted])), return_inverse=True)
     owner = np.full(inverse.max() + 1, -1, dtype=np.int32)
     owner[inverse[: len(own)]] = near // len(body_cell(cells).faces)
     return owner[inverse[len(own) :]]
@@ -50,8 +51,8 @@ def shared_faces(first: Ints, second: Ints) -> Ints:
     The numbers count the rows of ``all_faces(first)``, whose faces look into the second cells.
     """
     own, other = _keys(all_faces(first)), _keys(all_faces(second))
-    _, inverse = np.unique(np.vstack([own, other]), axis=0, return_inverse=True)
-    found: Ints = np.flatnonzero(np.isin(inverse[: len(own)], inverse[len(own) :])).astype(np.int32)
+    numbers = row_numbers(np.vstack([own, other]))
+    found: Ints = np.flatnonzero(np.isin(numbers[: len(own)], numbers[len(own) :])).astype(np.int32)
     return found
 
 
@@ -88,7 +89,7 @@ def places_of_faces(faces: Ints, corners: Ints) -> Ints:
     """Return which of the `faces` has each set of corner nodes ``(k, corners_per_face)``, in any order; −1 for none."""
     own = _keys(faces)
     wanted = np.sort(corners.reshape(-1, own.shape[1]), axis=1)
-    _, inverse = np.unique(np.vstack([own, wanted]), axis=0, return_inverse=True)
+    _, inverse = np.unique(row_numbers(np.vstack([own, wanted])), return_inverse=True)
     face_of = np.full(inverse.max(initial=-1) + 1, -1, dtype=np.int32)
     face_of[inverse[: len(faces)]] = np.arange(len(faces))
     found: Ints = face_of[inverse[len(faces) :]]
@@ -99,7 +100,7 @@ def connected_faces(faces: Ints) -> list[Ints]:
     """Group the faces that hang together by their sides: the places of each group's faces, by their first face."""
     sides = face_cell(faces).faces
     ends = np.sort(faces[:, sides].reshape(len(faces) * len(sides), -1)[:, :2], axis=1)
-    _, side = np.unique(ends, axis=0, return_inverse=True)
+    _, side = np.unique(row_numbers(ends), return_inverse=True)
     face = np.repeat(np.arange(len(faces)), len(sides))
     # A graph of faces and sides together, for the faces that share a side.
     graph = sp.coo_matrix((np.ones(len(face)), (face, len(faces) + side)), shape=[len(faces) + side.max() + 1] * 2)
@@ -113,7 +114,8 @@ def rim_edges(faces: Ints) -> Ints:
     """Return the sides that only one of the faces has: three-node edges ``(e, 3)``, or the ends of edges ``(e, 1)``."""
     sides = face_cell(faces).faces
     edges = faces[:, sides].reshape(-1, sides.shape[1])
-    _, first, counts = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
+    ends = row_numbers(np.sort(edges[:, :2], axis=1))
+    _, first, counts = np.unique(ends, return_index=True, return_counts=True)
     rim: Ints = edges[first[counts == 1]]
     return rim
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.common.optional import require
+from turgor.common.rows import row_numbers
 from turgor.mesh.faces import boundary_faces, host_cells
 from turgor.mesh.mesh import Mesh, in_space
 from turgor.mesh.quality import quality
@@ -144,7 +145,8 @@ def add_edges(plotter: Any, mesh: Mesh, faces: IntArray) -> None:
     corners = 3 if faces.shape[1] == 6 else 4
     start = np.arange(corners)
     chain = np.stack([faces[:, start], faces[:, corners + start], faces[:, (start + 1) % corners]], axis=2)
-    chain = np.unique(_ascending(chain.reshape(-1, 3)), axis=0)
+    chain = _ascending(chain.reshape(-1, 3))
+    chain = chain[np.unique(row_numbers(chain), return_index=True)[1]]
     lines = np.column_stack([np.full(len(chain), 3), chain]).ravel()
     drawn = require("pyvista").PolyData(in_space(mesh.points), lines=lines)
     actor = plotter.add_mesh(drawn, color="black", line_width=1, opacity=0.35, lighting=False)

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from turgor.mesh.cells import face_cell
-from turgor.mesh.faces import boundary_faces
+from turgor.mesh.faces import boundary_faces, places_of_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import IntArray
 
@@ -37,8 +37,7 @@ def outside_faces(mesh: Mesh) -> IntArray:
     hidden = [corners for name, corners in mesh.surfaces.items() if name.startswith(CAVITY_PREFIX)]
     if not hidden or mesh.symmetry_planes:
         return faces
-    inside = np.unique(_keys(np.concatenate(hidden), mesh.n_points))
-    visible = ~np.isin(_keys(faces, mesh.n_points), inside)
+    visible = places_of_faces(np.concatenate(hidden), faces[:, : face_cell(faces).n_corners]) < 0
     return faces[visible] if visible.any() else faces
 
 
@@ -82,10 +81,3 @@ def smooth_patches(points: npt.NDArray[np.float64], faces: IntArray) -> npt.NDAr
     smooth = np.einsum("ij,ij->i", normals[first], normals[second]) > _SHARP_COSINE
     links = coo_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(faces), len(faces)))
     return np.asarray(connected_components(links, directed=False)[1])
-
-
-def _keys(faces: IntArray, n_points: int) -> npt.NDArray[np.int64]:
-    """One number for each face, the same whatever the order of its corners; three corners tell which it is."""
-    corners = np.sort(faces[:, : face_cell(faces).n_corners].astype(np.int64), axis=1)
-    keys: npt.NDArray[np.int64] = (corners[:, 0] * n_points + corners[:, 1]) * n_points + corners[:, 2]
-    return keys

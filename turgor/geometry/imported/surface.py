@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.common.optional import require
+from turgor.common.rows import row_numbers
 from turgor.geometry.actuator import LARGEST, SMALLEST
 from turgor.geometry.imported.crossings import crossings
 from turgor.geometry.imported.stl_text import read_facets
@@ -189,8 +190,8 @@ def _cleaned(points: Floats, triangles: Ints, solid: NDArray[np.integer], path: 
     """Drop facets without area and those that are there more than once; refuse edges of more than two facets."""
     ordered = np.sort(triangles, axis=1)
     flat = (ordered[:, 0] == ordered[:, 1]) | (ordered[:, 1] == ordered[:, 2])
-    _, first, same = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
-    if (solid != solid[first[same.ravel()]]).any():
+    _, first, same = np.unique(row_numbers(ordered), return_index=True, return_inverse=True)
+    if (solid != solid[first[same]]).any():
         raise InputError("two solids of the file share a wall", expected="bodies apart from each other, or a STEP file")
     once = np.isin(np.arange(len(triangles)), first)
     for count, what in ((int(flat.sum()), "without area"), (int((~once & ~flat).sum()), "that are there twice")):
@@ -253,7 +254,7 @@ def _turned(points: Floats, triangles: Ints, path: str | Path) -> Ints:
     """Turn the facets of each shell to agree with each other."""
     found = agreeing(points, triangles)
     start = np.stack([found, np.roll(found, -1, axis=1)], axis=2).reshape(-1, 2)
-    if len(np.unique(start, axis=0)) < len(start):
+    if len(np.unique(row_numbers(start))) < len(start):
         raise InputError(
             "the surface has only one side, as a Möbius strip has", expected="a surface that bounds a body"
         )
@@ -301,7 +302,7 @@ def _check_crossings(points: Floats, triangles: Ints) -> None:
 def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
     """Return the number of the edge along each side of the triangles ``(k, 3)``, and how many triangles each has."""
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    _, edge, number = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    _, edge, number = np.unique(row_numbers(sides), return_inverse=True, return_counts=True)
     return edge.reshape(-1, 3).astype(np.int64), number.astype(np.int64)
 
 
