@@ -81,6 +81,9 @@ def _save(path: Path, body: Any, rest: Any, label: str, scene: dict[str, Any], c
     plotter = pyvista.Plotter(off_screen=True, window_size=scene["size"])
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
+    # Once a camera is set, nothing that is added asks the bounds of everything to place one.
+    _aim(plotter.camera, camera)
+    plotter.camera_set = True
     if rest is not None:
         plotter.add_silhouette(
             rest.clean(), color=_OUTLINE, line_width=2.0, feature_angle=_EDGE_ANGLE_DEG, decimate=None
@@ -113,7 +116,6 @@ def _save(path: Path, body: Any, rest: Any, label: str, scene: dict[str, Any], c
     width, height = scene["size"]
     plotter.add_text(_STRESS, position=(_BAR_LEFT * width, _BAR_PART * height - 34), font_size=15, color=_INK)
     plotter.add_text(label, position=(24, height - 60), font_size=20, color=_INK)
-    _aim(plotter.camera, camera)
     plotter.renderer.ResetCameraClippingRange()
     plotter.screenshot(str(path))
     plotter.close()
