@@ -29,7 +29,8 @@ STRETCHES = (0.3, 6.0)
 """The range that a verdict covers unless another is asked for."""
 
 _SAMPLES = 400
-_BISECTIONS = 40
+_ROUNDS = 5
+"""How often a loss is looked for, each time between the two samples that hold it."""
 
 
 def principal_stretches(mode: str, stretch: Array) -> Array:
@@ -39,11 +40,7 @@ def principal_stretches(mode: str, stretch: Array) -> Array:
 
 def drucker_matrix(material: Hyperelastic, stretches: Array) -> Array:
     """Return ∂²Ŵ/∂ε_α∂ε_β in MPa, ``(..., 2, 2)``, at isochoric principal `stretches` ``(..., 3)``."""
-    x = np.asarray(stretches, dtype=float)
-    _, w, h = material.principal(x)
-    H = x[..., :, None] * x[..., None, :] * h + IDENTITY * (x * w)[..., None]
-    projected: Array = H[..., :2, :2] - H[..., :2, 2:] - H[..., 2:, :2] + H[..., 2:, 2:]
-    return projected
+    return _isochoric_part(_strain_hessian(material, stretches))
 
 
 def drucker_margin(material: Hyperelastic, stretches: Array) -> Array:
@@ -51,8 +48,39 @@ def drucker_margin(material: Hyperelastic, stretches: Array) -> Array:
 
     It is 2 in the undeformed state and positive where the material is stable.
     """
-    eigenvalues: Array = np.asarray(np.linalg.eigvalsh(drucker_matrix(material, stretches)), dtype=float)
-    return eigenvalues[..., 0] / material.shear_modulus
+    return np.asarray(_smallest_eigenvalue(_strain_hessian(material, stretches)) / material.shear_modulus)
+
+
+def _strain_hessian(material: Hyperelastic, stretches: Array) -> Array:
+    """Return ∂²W/∂ε_a∂ε_b in MPa, ``(..., 3, 3)``, by all three log strains."""
+    x = np.asarray(stretches, dtype=float)
+    _, w, h = material.principal(x)
+    return np.asarray(x[..., :, None] * x[..., None, :] * h + IDENTITY * (x * w)[..., None])
+
+
+def _isochoric_part(H: Array) -> Array:
+    """Return the matrix of two log strains of that of three, the third being minus the sum of the others."""
+    projected: Array = H[..., :2, :2] - H[..., :2, 2:] - H[..., 2:, :2] + H[..., 2:, 2:]
+    return projected
+
+
+def _smallest_eigenvalue(H: Array) -> Array:
+    """Return that of the isochoric part, ``(...)``, also where the other one is larger by more digits than there are.
+
+    Its determinant is the sum of the cofactors of `H` (Cauchy and Binet), in which what is large in both rows of the
+    part does not have to cancel.
+    """
+    size = np.abs(H).max(axis=(-2, -1))
+    size = np.where(size > 0.0, size, 1.0)
+    H = H / size[..., None, None]
+    part = _isochoric_part(H)
+    trace, apart = part[..., 0, 0] + part[..., 1, 1], part[..., 0, 0] - part[..., 1, 1]
+    larger = 0.5 * (trace + np.copysign(np.hypot(apart, 2.0 * part[..., 0, 1]), trace))
+    rows = [(H[..., i, :], H[..., j, :]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    # The cofactors of a row are the cross product of the two others.
+    determinant = sum(np.cross(first, second).sum(axis=-1) for first, second in rows)
+    other = determinant / np.where(larger == 0.0, 1.0, larger)
+    return np.asarray(size * np.minimum(larger, other))
 
 
 def stable_range(
@@ -74,22 +102,21 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
         stretches = principal_stretches(mode, np.exp(log_stretch))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             locked = np.isposinf(material.principal(stretches)[0])
-            matrix = drucker_matrix(material, stretches) / material.shear_modulus
-            finite = np.all(np.isfinite(matrix), axis=(-2, -1))
-            found = np.linalg.eigvalsh(np.where(finite[..., None, None], matrix, -np.eye(2)))[..., 0]
+            H = _strain_hessian(material, stretches) / material.shear_modulus
+            finite = np.all(np.isfinite(H), axis=(-2, -1))
+            found = _smallest_eigenvalue(np.where(finite[..., None, None], H, -IDENTITY))
         return np.asarray(np.where(locked, 1.0, found), dtype=float)
 
     # Quadratic spacing: sets that are lost, are often lost within a few per cent of strain.
     path = np.log(end) * np.linspace(0.0, 1.0, _SAMPLES) ** 2
-    lost = np.flatnonzero(~(margin(path) > 0.0))
-    if not len(lost):
-        return None
-    if lost[0] == 0:
-        return 1.0
-    good, bad = path[lost[0] - 1], path[lost[0]]
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if margin(np.array(middle)) > 0.0 else (good, middle)
+    for _ in range(_ROUNDS):
+        lost = np.flatnonzero(~(margin(path) > 0.0))
+        if not len(lost):
+            return None
+        if lost[0] == 0:
+            return 1.0
+        good, bad = path[lost[0] - 1 : lost[0] + 1]
+        path = np.linspace(good, bad, _SAMPLES)
     return float(np.exp(good))
 
 
