@@ -136,12 +136,14 @@ class _Running:
         with self._resumed() if continues else nullcontext() as stored:
             mesh = stored.mesh if stored else self._meshed()
             self.show.stage("system")
-            if not kernels_are_kept("contact" if self.case.contact else "fem"):
-                self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
+            kept = kernels_are_kept("contact" if self.case.contact else "fem")
             system = system_of(self.case, mesh, materials)
             course = self.case.course(system)
             # Nothing is written before everything that can be checked has been.
             with stored or self._created(mesh) as store:
+                if not kept:
+                    # Not before the case is known to be right: what is wrong with it is to be told alone.
+                    self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
                 self.run_log.write_to(self.folder / "run.log", append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
                 if fit:
