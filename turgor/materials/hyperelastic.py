@@ -10,6 +10,7 @@ Shapes: `F` is ``(..., 3, 3)`` with any leading shape; `P` ``(..., 3, 3)``; the 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -96,6 +97,7 @@ class Hyperelastic:
             object.__setattr__(self, "volumetric", Quadratic(NEARLY_INCOMPRESSIBLE * mu))
 
     @classmethod
+    @functools.cache
     def constants(cls) -> tuple[Constant, ...]:
         """Return the constants that the model takes, in the order they are declared."""
         return tuple(
