@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
 from turgor.fem.loads import Pressure
+from turgor.fem.programme import PROPORTIONAL, Programme
 from turgor.fem.section import Axisymmetric
 from turgor.fem.supports import Sliding
 from turgor.fem.system import System
@@ -26,10 +27,11 @@ from turgor.solver.volume import stable_while_held
 C10, C01, RATIO = 0.05, 0.007, 1.2
 
 
-def sphere(material, ratio: float, pressure: float, n: int = 2) -> System:
+def sphere(material, ratio: float, pressure: float, n: int = 2, programme: Programme = PROPORTIONAL) -> System:
     """Half a sphere of inner radius one, turned about its axis."""
     mesh = quarter_ring(1.0, ratio, n, "quad9")
-    return System(mesh, {"body": material}, [Sliding("y0")], [Pressure("inner", pressure)], section=Axisymmetric())
+    loads = [Pressure("inner", pressure, programme)]
+    return System(mesh, {"body": material}, [Sliding("y0")], loads, section=Axisymmetric())
 
 
 def exact_pressure(stretch: float) -> float:
@@ -57,8 +59,9 @@ def inner_stretch(system: System, u: np.ndarray) -> float:
     return float(np.linalg.norm(system.mesh.points[nodes] + u[nodes], axis=1).mean())
 
 
-def balloon(pressure: float) -> System:
-    return sphere(MooneyRivlin2(C10=C10, C01=C01, volumetric=Quadratic(1e4)), RATIO, pressure)
+def balloon(pressure: float, programme: Programme = PROPORTIONAL) -> System:
+    material = MooneyRivlin2(C10=C10, C01=C01, volumetric=Quadratic(1e4))
+    return sphere(material, RATIO, pressure, programme=programme)
 
 
 def test_volume_control_traces_the_snap():
@@ -98,6 +101,24 @@ def test_the_state_behind_the_snap_is_found_on_request():
     assert inner_stretch(system, snapped.state.u) == pytest.approx(behind, rel=5e-3)
     assert snapped.stable in (True, None)
     assert float(end.state.loads[0]) == pytest.approx(exact_pressure(inner_stretch(system, end.state.u)), rel=5e-3)
+
+
+def test_a_pressure_that_is_taken_back_meets_its_minimum_and_snaps_back():
+    _, highest, low, lowest, _ = extremes()
+    system = balloon(1.1 * highest, Programme((0.0, 0.5, 1.0), (0.0, 1.0, 0.1)))
+    found = solve_path(system, [0.5, 1.0], options=PathOptions(post_snap=True))
+    assert [e.event for e in found] == [Event.LIMIT, Event.POST_SNAP, None, Event.MINIMUM, Event.POST_SNAP, None]
+    blown, minimum, snapped = found[2:5]
+    assert float(minimum.state.loads[0]) == pytest.approx(lowest, rel=5e-3)
+    assert inner_stretch(system, minimum.state.u) == pytest.approx(low, rel=1e-2)
+    assert float(snapped.state.loads[0]) == pytest.approx(
+        exact_pressure(inner_stretch(system, snapped.state.u)), rel=5e-3
+    )
+    assert inner_stretch(system, snapped.state.u) < 0.6 * low
+    with pytest.raises(LimitPressureError, match="shrinks while the pressure rises") as stop:
+        solve_path(system, [1.0], start=blown)
+    assert not stop.value.limit.maximum
+    assert "post-snap" in stop.value.advice
 
 
 def test_a_neo_hookean_sphere_locks_nowhere():

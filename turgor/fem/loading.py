@@ -52,6 +52,12 @@ class Loading:
         """Return the straight line that the loads follow at a load fraction, at a kink the later one."""
         return LoadLine(fraction, self.at(fraction), self.growth(fraction))
 
+    def leading(self, growth: Floats) -> int:
+        """Return the place of the load that `growth` ``(n_loads,)`` changes most: a pressure, if it changes one."""
+        size = np.abs(growth)
+        of_pressures = np.array([isinstance(load, Pressure) for load in self.loads]) * size
+        return int(np.argmax(of_pressures if np.any(of_pressures) else size))
+
     @property
     def kinks(self) -> tuple[float, ...]:
         """The load fractions within (0, 1) at which a load's programme changes its slope, ascending."""

@@ -109,7 +109,11 @@ def at_limit(
     worst = int(np.argmax(np.linalg.norm(system.body_part(limit.mode), axis=1)))
     facts["mode_largest_at_mm"] = [round(float(x), 3) for x in system.mesh.points[worst]]
     beyond = _beyond(system, limit.equilibrium)
-    advice = "a thicker wall, a stiffer or a stiffening material raises the limit"
+    advice = (
+        "a thicker wall, a stiffer or a stiffening material raises the limit"
+        if limit.maximum
+        else "the state that it snaps back to is found with control.at_limit: post-snap"
+    )
     if system.cavities and knows_volume(system):
         advice = f"Control by volume follows it further; {advice}"
     advice = advice[0].upper() + advice[1:]
@@ -128,11 +132,10 @@ def at_limit(
 
 def _beyond(system: System, limit: Equilibrium) -> str:
     """Say how the actuator goes on behind a limit: the conjugate of the load grows further while the load falls."""
-    pressures = [cavity.channel for cavity in system.cavities]
     growth = system.loading.growth(limit.fraction)
-    if not np.any(growth[pressures]):
+    leading = system.loading.leading(growth)
+    if not system.loading.names[leading].startswith(PRESSURE_PREFIX):
         return "gives way while the load falls"
-    leading = pressures[int(np.argmax(np.abs(growth[pressures])))]
     if limit.state.loads[leading] < 0.0:
         return "shrinks while the suction falls" if growth[leading] < 0.0 else "grows while the suction rises"
     return "grows while the pressure falls" if growth[leading] > 0.0 else "shrinks while the pressure rises"

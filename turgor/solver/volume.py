@@ -64,7 +64,7 @@ class LimitPoint:
     equilibrium
         The state.
     maximum
-        Whether the load is largest there, as it was growing from rest (else it begins to grow again).
+        Whether the load is largest there in size; else it is smallest, on its way back or where it begins to grow.
     mode
         The eigenmode that the tangent loses its stiffness in, ``(n_points, 3)``, largest component one.
     """
@@ -272,7 +272,13 @@ class VolumeWalk:
         if abs(slope * span) > STEEP * abs(best.fraction):
             self.stand_at(second, first)
             raise NotConvergedError(f"the path jumps near {best.fraction:.4g} of the load, where a limit was expected")
-        return LimitPoint(best, ends[0][1] * self._sense > 0.0, self.softest_mode(best))
+        return LimitPoint(best, self._is_largest(best, ends[0][1] * span), self.softest_mode(best))
+
+    def _is_largest(self, limit: Equilibrium, change: float) -> bool:
+        """Whether the leading load is largest in size at a limit, to which the load fraction has come by a `change`."""
+        growth = self.line.growth
+        leading = self.system.loading.leading(growth)
+        return bool(change * growth[leading] * limit.state.loads[leading] > 0.0)
 
     def softest_mode(self, equilibrium: Equilibrium) -> Floats:
         """Return the eigenmode of the tangent's smallest eigenvalue in size, as :func:`softest_mode`."""
@@ -292,12 +298,6 @@ class VolumeWalk:
     def loses_stability(self, before: Equilibrium, found: Equilibrium) -> bool:
         """Say whether a state is unstable while the quantity is held, and the one before it was not seen to be."""
         return self.is_stable(found) is False and self.is_stable(before) is not False
-
-    @property
-    def _sense(self) -> float:
-        """The sign of the compliance of a stable state."""
-        weights = self.quantity.weights
-        return -1.0 if weights is not None and weights @ self.line.growth < 0.0 else 1.0
 
     def _may_hide_limits(self, found: Equilibrium) -> bool:
         """Whether the load may have a maximum and a minimum on the way to a state, both hidden."""
