@@ -131,6 +131,16 @@ def test_fit_prints_what_was_promised(tmp_path: Path) -> None:
     assert found["data"]
 
 
+def test_a_fit_says_which_rows_it_does_not_use(tmp_path: Path) -> None:
+    rows = [f"{0.1 * k:.1f},{0.03 * k - 0.001 * k * k:.3f}" for k in range(9)]
+    rows[4] = "0.4,"
+    file = tmp_path / "rubber.csv"
+    file.write_text("\n".join(["Strain,Stress (MPa)", *rows]), encoding="utf-8")
+    result = turgor("fit", file, "--model", "neo-hookean")
+    assert result.exit_code == 0
+    assert "rubber.csv: not used: row 6 (no number)" in result.stderr
+
+
 def test_a_written_material_fits_into_a_case(tmp_path: Path) -> None:
     result = turgor("fit", GOOD_TEST, "--model", "yeoh-1", "--out", tmp_path / "m.yaml", "--report", tmp_path / "fit")
     assert result.exit_code == 0

@@ -131,6 +131,20 @@ def test_a_constrained_fit_stays_stable_where_the_volume_is_fitted_too():
     assert kept.material.poisson_ratio == pytest.approx(0.4, abs=0.05)
 
 
+def test_where_lateral_strain_is_missing_the_stress_counts_alone():
+    material = create("ogden-1", {"mu1": 0.03, "alpha1": 3.0}, poisson=0.35)
+    whole = compressible_test(material)
+    for missing in (slice(5, 9), slice(None)):
+        lateral = whole.lateral.copy()
+        lateral[missing] = np.nan
+        found = fit(MaterialTest("uniaxial", whole.stretch, whole.stress, lateral=lateral), "ogden-1").fits[0]
+        if missing == slice(None):
+            assert "lateral" not in found.remark
+        else:
+            assert found.parameters == pytest.approx(material.parameters, rel=1e-6)
+            assert found.material.poisson_ratio == pytest.approx(0.35, rel=1e-6)
+
+
 def test_a_test_of_no_weight_does_not_count():
     material = create("neo-hookean", {"C10": 0.0134}, poisson=0.32)
     x = np.linspace(1.0, 1.5, 12)

@@ -205,6 +205,18 @@ def test_missing_values_are_dropped_and_listed(tmp_path):
     assert len(test.stretch) == 19
 
 
+def test_a_row_without_lateral_strain_counts_by_its_stress(tmp_path):
+    lateral = STRETCH**-0.45 - 1.0
+    lines = table("strain,stress (MPa),lateral strain", STRETCH - 1, STRESS, lateral).splitlines()
+    for line in (4, 7):
+        lines[line] = lines[line].rsplit(",", 1)[0] + ","
+    test = read_one(write(tmp_path, "\n".join(lines)))
+    assert not test.dropped
+    assert np.flatnonzero(np.isnan(test.lateral)).tolist() == [3, 6]
+    assert any("lateral strain is missing in rows 5, 8" in note for note in test.warnings)
+    assert test.has_lateral
+
+
 def test_unordered_rows_are_sorted(tmp_path):
     order = np.random.default_rng(1).permutation(len(STRETCH))
     test = read_one(write(tmp_path, table("strain,stress (MPa)", (STRETCH - 1)[order], STRESS[order])))

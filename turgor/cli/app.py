@@ -135,8 +135,8 @@ def fit(
         stable_to=stable_to,
     )
     for test in fitted.tests:
-        for warning in test.warnings:
-            tell(f"{test.file}: {warning}")
+        for text in (*test.dropped, *test.warnings):
+            tell(f"{test.file}: {text}")
     if out:
         tg.write_material(fitted, out)
     if report:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,19 @@ OUTLIER_DEVIATION = 8.0
 OUTLIER_FLOOR = 0.05
 """An outlier deviates from its neighbours' line by 8 robust standard deviations and 5 % of the largest stress."""
 
+LISTED = 4
+"""Rows of which all numbers are told."""
+
 OUTLIER_MINIMUM = 15
 """Curves with fewer rows are not searched for outliers."""
+
+
+def numbered(rows: Sequence[int]) -> str:
+    """Return numbers of rows in words, of many the first few and the last."""
+    if len(rows) == 1:
+        return f"row {rows[0]}"
+    listed = ", ".join(map(str, rows if len(rows) <= LISTED else rows[: LISTED - 1]))
+    return f"rows {listed}" if len(rows) <= LISTED else f"{len(rows)} rows ({listed} … {rows[-1]})"
 
 
 @dataclass(frozen=True)
@@ -32,6 +43,9 @@ class Dropped:
     rows: tuple[int, ...]
     stretch: Array
     stress: Array
+
+    def __str__(self) -> str:
+        return f"not used: {numbered(self.rows)} ({self.reason})"
 
     def as_dict(self) -> dict[str, object]:
         """Return the reason, the number of rows and their numbers."""

@@ -157,9 +157,10 @@ class _Lateral:
         for test, factor, weights in self.parts:
             lateral, stress = _response(trial, test)
             of_stress.append(weights / self.largest * (stress - test.stress))
-            if test.lateral is not None:
-                weight = factor / self.heaviest / float(np.ptp(test.lateral) or 1.0)
-                of_stretch.append(weight * (lateral - test.lateral))
+            if test.lateral is not None and test.has_lateral:
+                measured = np.isfinite(test.lateral)
+                weight = factor / self.heaviest / float(np.ptp(test.lateral[measured]) or 1.0)
+                of_stretch.append(weight * (lateral - test.lateral)[measured])
         return _finite(np.concatenate(of_stress)), _finite(np.concatenate(of_stretch))
 
     def residual(self, values: Array) -> Array:

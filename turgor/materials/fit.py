@@ -225,7 +225,7 @@ def _judged(
     material: Hyperelastic | None = None
     try:
         found = fit_bulk_modulus(kind.of(_named(kind, solution)), volumetric)
-        if any(test.lateral is not None for test in problem.counted):
+        if any(test.has_lateral for test in problem.counted):
             found, solution = fit_compressible(found, problem, in_proportion=constrained)
             remark = f"compressible, fitted to the lateral strain: Poisson's ratio {found.poisson_ratio:.4g}"
         material = found

@@ -177,7 +177,7 @@ class FitReport:
     @property
     def measured_volume(self) -> bool:
         """Whether a test tells how the volume changes, so that the bulk modulus is fitted too."""
-        return any(test.mode == "volumetric" or test.lateral is not None for test in self.tests)
+        return any(test.mode == "volumetric" or test.has_lateral for test in self.tests)
 
     @property
     def largest_stress(self) -> float:

@@ -41,7 +41,7 @@ class MaterialTest:
     stress
         Nominal stress in MPa, ``(n,)``; for ``"volumetric"`` the mean Cauchy stress (negative in compression).
     lateral
-        Lateral stretch ``(n,)`` where it was measured.
+        Lateral stretch ``(n,)``, if it was measured; NaN where it is missing.
     """
 
     mode: str
@@ -62,6 +62,11 @@ class MaterialTest:
     def deformation(self) -> Array:
         """What is zero at rest: engineering strain, the amount of shear, or J − 1."""
         return self.stretch if self.mode == "simple-shear" else self.stretch - 1.0
+
+    @property
+    def has_lateral(self) -> bool:
+        """Whether the lateral stretch was measured anywhere."""
+        return self.lateral is not None and bool(np.any(np.isfinite(self.lateral)))
 
     def within(self, low: float, high: float) -> MaterialTest:
         """Return the part of the test between two engineering strains.

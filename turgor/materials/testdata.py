@@ -11,7 +11,7 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
-from turgor.materials.cleaning import Curve, clean
+from turgor.materials.cleaning import Curve, clean, numbered
 from turgor.materials.columns import Column, find, header_unit, is_header, lacks, matching, understand
 from turgor.materials.kinematics import Array
 from turgor.materials.measurement import CROSSHEAD_WARNING, MINIMUM_POINTS, MODES, TOE_LIMIT, MaterialTest, Specimen
@@ -133,7 +133,7 @@ class _Reading:
             dropped=dropped,
             columns=tuple(self.used),
             assumed=tuple(self.assumed),
-            warnings=(*self.warnings, *changed),
+            warnings=(*self.warnings, *changed, *_missing_lateral(curve)),
         )
         if abs(test.toe) <= TOE_LIMIT:
             return test
@@ -363,3 +363,10 @@ class _Reading:
             "extensometer": r"extensometer|extensometric",
         }
         return next((source for source, pattern in patterns.items() if re.search(pattern, text)), None)
+
+
+def _missing_lateral(curve: Curve) -> list[str]:
+    """Say in which rows the lateral strain is missing, if it is in some."""
+    if curve.lateral is None or np.all(known := np.isfinite(curve.lateral)):
+        return []
+    return [f"the lateral strain is missing in {numbered(curve.rows[~known].tolist())}: the stress alone counts there"]
