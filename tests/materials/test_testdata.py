@@ -320,6 +320,14 @@ MALFORMED = {
     "too few": ("strain,stress (MPa)\n0.1,0.2\n0.2,0.3\n", ["2 usable"]),
     "impossible strain": (table("strain,stress (MPa)", STRETCH - 4, STRESS), ["-100 %", "row 2"]),
     "unknown mode": ("mode,strain,stress (MPa)\n" + "torsion,0.1,0.2\n" * 6, ["torsion", "uniaxial"]),
+    "contraction without its sign": (
+        table("strain,stress (MPa),lateral strain", STRETCH - 1, STRESS, 1.0 - STRETCH**-0.5),
+        ["widens", "row 22", "negative lateral strain"],
+    ),
+    "impossible lateral stretch": (
+        table("strain,stress (MPa),lateral stretch", STRETCH - 1, STRESS, np.where(STRETCH > 2.0, -0.5, STRETCH**-0.5)),
+        ["lateral strain of -100 %", "row ", "above 0"],
+    ),
     "contradicting strains": (
         table("strain,true strain,stress (MPa)", STRETCH - 1, STRETCH - 1, STRESS),
         ["contradict", "true strain", "row 22"],

@@ -20,6 +20,10 @@ from turgor.materials.tabular import Table, read_table
 LARGEST_BARE_STRAIN = 25.0
 """A strain above it without unit is taken for percent and refused."""
 
+WIDENING = 0.05
+"""Lateral strain over strain beyond which a specimen is said to widen; what is measured of one that hardly contracts
+scatters about zero."""
+
 PAIR_TOLERANCE = 0.02
 """Largest relative difference between a true value and the one that follows from the engineering columns."""
 
@@ -103,6 +107,7 @@ class _Reading:
         self._check_deformation(deformation, rows)
         self._check_compression(deformation, stress, rows)
         curve, dropped, changed = clean(Curve(rows, deformation, stress, lateral))
+        self._check_lateral(curve)
         if len(curve) < MINIMUM_POINTS:
             gone = "; ".join(f"{len(part.rows)} dropped ({part.reason})" for part in dropped)
             raise InputError(
@@ -324,6 +329,23 @@ class _Reading:
                     value=float(values[worst]),
                     expected="negative strains and stresses (or 'uniaxial' as the kind of test, if it is a tension)",
                 )
+
+    def _check_lateral(self, curve: Curve) -> None:
+        """Refuse lateral strains that are impossible, and those that say that a specimen widens as it is stretched."""
+        if curve.lateral is None or not np.any(np.isfinite(curve.lateral)):
+            return
+        strain = curve.lateral - 1.0
+        widening = strain * curve.deformation
+        problem, expected, worst = "", "", 0
+        if np.nanmin(strain) <= -1.0:
+            problem, worst = "a lateral strain of -100 % or less is impossible", int(np.nanargmin(strain))
+            expected = "lateral strains above -1, lateral stretches above 0"
+        elif np.nansum(widening) > WIDENING * np.sum(curve.deformation**2):
+            problem, worst = "the specimen widens as it is stretched", int(np.nanargmax(widening))
+            expected = "contraction as a negative lateral strain, or a lateral stretch below 1"
+        if problem:
+            key = f"row {curve.rows[worst]}"
+            raise InputError(problem, file=self.file, key=key, value=float(f"{strain[worst]:.6g}"), expected=expected)
 
     def _check_pair(self, true: Column, expected: Array, quantity: str) -> None:
         """Refuse true values that contradict the engineering ones."""
