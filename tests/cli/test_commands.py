@@ -175,7 +175,8 @@ def test_a_fit_is_told_what_its_file_does_not_say() -> None:
         (["--strain-source", "guess"], ("strain_source", "'guess'", "crosshead")),
         (["--weight", "1", "--weight", "2"], ("weights", "1 numbers, one for each test")),
         (["--stability", "maybe"], ("stability", "'maybe'", "prefer, require or ignore")),
-        (["--stable-to", "0.5"], ("stable_to", "above 1")),
+        (["--stable-to", "0.5"], ("stable_to", "from 1 up")),
+        (["--stable-to", "inf"], ("stable_to", "from 1 up")),
         (["--known-modulus", "500 MPa"], ("does not reach the known modulus",)),
     ],
 )

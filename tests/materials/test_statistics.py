@@ -145,6 +145,7 @@ def test_bounds_hold():
         {"bounds": {"C10": (2.0, 1.0)}},
         {"stability": "hope"},
         {"stable_to": 0.5},
+        {"stable_to": np.inf},
     ],
 )
 def test_wrong_options(options):

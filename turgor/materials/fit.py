@@ -93,8 +93,8 @@ def fit(
         raise InputError("unknown kind of error", key="error", value=error, expected="absolute or relative")
     problem = Problem(mechanical, _factors(mechanical, weights), error == "relative", dict(bounds or {}))
     stretch = largest_stretch(mechanical) if stable_to is None else stable_to
-    if not stretch >= 1.0:
-        raise InputError("this stretch must be above 1", key="stable_to", value=stable_to)
+    if not 1.0 <= stretch < np.inf:
+        raise InputError("this is no largest stretch", key="stable_to", value=stable_to, expected="a number from 1 up")
     volumetric = [test for test in tests if test.mode == "volumetric"]
     fits: list[Fit] = []
     for kind in kinds:
