@@ -136,6 +136,7 @@ CASES: dict[str, tuple[str, ...]] = {
     "text-for-a-list.yaml": ("measures", "a list"),
     "text-for-a-number.yaml": ("solver.steps", "'one'", "whole number"),
     "text-tag.yaml": ("line 4", "tag"),
+    "tolerance-of-a-half.yaml": ("solver.tolerance", "0.5", "less than or equal to 0.001"),
     "too-fine.yaml": ("mesh.size", "more than 20 elements", "0.15 mm"),
     "turned-and-twisted.yaml": ("measures", "'twist' has no meaning in a body of revolution", "in space"),
     "turned-and-pulled-aside.yaml": ("loads.tip-face", "along y, the axis of revolution"),

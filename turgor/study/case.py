@@ -83,7 +83,10 @@ class SolverCase(StrictModel):
     outputs: tuple[QuantityText, ...] | None = Field(
         default=None, min_length=1, description="or states at these pressures, times or volumes"
     )
-    tolerance: Part = Field(default=1e-7, le=1e-3, description="residual relative to the largest of the forces in it")
+    # Not a Part: of two bounds of one kind pydantic keeps the type's.
+    tolerance: Annotated[float, Field(strict=True, gt=0.0, le=1e-3)] = Field(
+        default=1e-7, description="residual relative to the largest of the forces in it"
+    )
     max_iterations: Count = Field(default=25, le=1000, description="tangents that may be factorised for one state")
     largest_step: Part = Field(default=1.0, description="longest step, as part of the load")
     smallest_step: Part = Field(default=1e-3, description="shortest step tried before giving up")
