@@ -151,9 +151,6 @@ def test_a_test_of_no_weight_does_not_count():
     foreign = MaterialTest("uniaxial", x, 10.0 * (x - 1.0), lateral=np.ones_like(x))
     test = compressible_test(material, 1e-3)
     alone, beside = fit(test, "neo-hookean").fits[0], fit([test, foreign], "neo-hookean", weights=(1, 0)).fits[0]
-    for name in ("parameters", "confidence"):
-        ours, theirs = (list(getattr(found, name).values()) for found in (beside, alone))
-        np.testing.assert_allclose(ours, theirs, rtol=1e-8)
-    for name in ("rmse", "residual_norm", "r2", "aic", "bic"):
-        assert getattr(beside, name) == pytest.approx(getattr(alone, name), rel=1e-8), name
-    assert beside.material.poisson_ratio == pytest.approx(alone.material.poisson_ratio, rel=1e-8)
+    for name in ("parameters", "confidence", "rmse", "residual_norm", "r2", "aic", "bic"):
+        assert getattr(beside, name) == getattr(alone, name), name
+    assert beside.material.poisson_ratio == alone.material.poisson_ratio

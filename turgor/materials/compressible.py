@@ -139,8 +139,8 @@ class _Lateral:
         self.start, self.kind = material, type(material)
         self.constants = np.array(list(material.parameters.values()))
         self.bounds = bounds_of(self.kind, problem)
-        parts = zip(problem.tests, problem.factors, problem.point_weights, strict=True)
-        self.parts = [part for part in parts if part[1] > 0]
+        counted = problem.of_counted
+        self.parts = list(zip(counted.tests, counted.factors, counted.point_weights, strict=True))
         self.largest = max(float(np.abs(weights * test.stress).max()) for test, _, weights in self.parts)
         self.heaviest = max(problem.factors)
 

@@ -76,6 +76,11 @@ class Problem:
         return tuple(test for test, factor in zip(self.tests, self.factors, strict=True) if factor > 0)
 
     @property
+    def of_counted(self) -> Problem:
+        """The problem of these tests alone."""
+        return replace(self, tests=self.counted, factors=tuple(factor for factor in self.factors if factor > 0))
+
+    @property
     def point_weights(self) -> tuple[Array, ...]:
         """Weights of the points of each test."""
         return tuple(self._weights_of(*pair) for pair in zip(self.tests, self.factors, strict=True))
@@ -162,16 +167,15 @@ def solve(model: type[Hyperelastic], problem: Problem, limits: Limits | None = N
             key="models",
             expected="more points or a model with fewer constants",
         )
-    linear = _Linear(model, problem, limits)
+    linear = _Linear(model, problem.of_counted, limits)
     best = _search(model, linear) if linear.searched else np.zeros(0)
     moduli, relative = linear.solve(best)
     if relative[0] == FAR:
         return None
     values = linear.assemble(moduli, best)
-    residual = linear.prediction(values) - linear.stress
-    counts, weights = linear.weights > 0, linear.weights[linear.weights > 0]
-    jacobian = _jacobian(values, linear)[counts] * weights[:, None]
-    return Solution(values, residual, (weights * residual[counts],), jacobian)
+    residual = problem.prediction(model.trial(list(values))) - problem.stress
+    jacobian = _jacobian(values, linear) * linear.weights[:, None]
+    return Solution(values, residual, (linear.weights * residual[problem.weights > 0],), jacobian)
 
 
 def bounds_of(model: type[Hyperelastic], problem: Problem) -> Array:
