@@ -326,7 +326,7 @@ MALFORMED = {
     ),
     "impossible lateral stretch": (
         table("strain,stress (MPa),lateral stretch", STRETCH - 1, STRESS, np.where(STRETCH > 2.0, -0.5, STRETCH**-0.5)),
-        ["lateral strain of -100 %", "row ", "above 0"],
+        ["lateral strain of -100 %", "row 13", "above 0"],
     ),
     "contradicting strains": (
         table("strain,true strain,stress (MPa)", STRETCH - 1, STRETCH - 1, STRESS),

@@ -20,11 +20,11 @@ OUTLIER_DEVIATION = 8.0
 OUTLIER_FLOOR = 0.05
 """An outlier deviates from its neighbours' line by 8 robust standard deviations and 5 % of the largest stress."""
 
-LISTED = 4
-"""Rows of which all numbers are told."""
-
 OUTLIER_MINIMUM = 15
 """Curves with fewer rows are not searched for outliers."""
+
+LISTED = 4
+"""Rows of which all numbers are told."""
 
 
 def numbered(rows: Sequence[int]) -> str:

@@ -40,7 +40,7 @@ def principal_stretches(mode: str, stretch: Array) -> Array:
 
 def drucker_matrix(material: Hyperelastic, stretches: Array) -> Array:
     """Return ∂²Ŵ/∂ε_α∂ε_β in MPa, ``(..., 2, 2)``, at isochoric principal `stretches` ``(..., 3)``."""
-    return _isochoric_part(_strain_hessian(material, stretches))
+    return _isochoric_part(_energy_and_hessian(material, stretches)[1])
 
 
 def drucker_margin(material: Hyperelastic, stretches: Array) -> Array:
@@ -48,14 +48,15 @@ def drucker_margin(material: Hyperelastic, stretches: Array) -> Array:
 
     It is 2 in the undeformed state and positive where the material is stable.
     """
-    return np.asarray(_smallest_eigenvalue(_strain_hessian(material, stretches)) / material.shear_modulus)
+    _, H = _energy_and_hessian(material, stretches)
+    return np.asarray(_smallest_eigenvalue(H) / material.shear_modulus)
 
 
-def _strain_hessian(material: Hyperelastic, stretches: Array) -> Array:
-    """Return ∂²W/∂ε_a∂ε_b in MPa, ``(..., 3, 3)``, by all three log strains."""
+def _energy_and_hessian(material: Hyperelastic, stretches: Array) -> tuple[Array, Array]:
+    """Return W ``(...)`` and ∂²W/∂ε_a∂ε_b ``(..., 3, 3)``, MPa, by all three log strains."""
     x = np.asarray(stretches, dtype=float)
-    _, w, h = material.principal(x)
-    return np.asarray(x[..., :, None] * x[..., None, :] * h + IDENTITY * (x * w)[..., None])
+    W, w, h = material.principal(x)
+    return W, np.asarray(x[..., :, None] * x[..., None, :] * h + IDENTITY * (x * w)[..., None])
 
 
 def _isochoric_part(H: Array) -> Array:
@@ -101,8 +102,8 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
         # Beyond its locking stretch a material has infinite energy: it does not go there, which is not a loss.
         stretches = principal_stretches(mode, np.exp(log_stretch))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            locked = np.isposinf(material.principal(stretches)[0])
-            H = _strain_hessian(material, stretches) / material.shear_modulus
+            W, H = _energy_and_hessian(material, stretches)
+            locked, H = np.isposinf(W), H / material.shear_modulus
             finite = np.all(np.isfinite(H), axis=(-2, -1))
             found = _smallest_eigenvalue(np.where(finite[..., None, None], H, -IDENTITY))
         return np.asarray(np.where(locked, 1.0, found), dtype=float)

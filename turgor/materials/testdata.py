@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
 from turgor.common.units import to_internal
@@ -304,15 +305,19 @@ class _Reading:
                 return to_internal(f"{text} {unit}" if unit else text, dimension, key=f"{self.file}: {key}")
         return None
 
-    def _check_deformation(self, deformation: Array, rows: Array) -> None:
-        if self.mode != "simple-shear" and np.any(deformation <= -1.0):
-            worst = int(np.nanargmin(deformation))
+    def _check_deformation(self, deformation: Array, rows: NDArray[np.int64]) -> None:
+        if self.mode != "simple-shear":
+            self._check_possible(deformation, rows, "strain", "engineering strain above -1, compression negative")
+
+    def _check_possible(self, strain: Array, rows: NDArray[np.int64], quantity: str, expected: str) -> None:
+        if np.any(strain <= -1.0):
+            worst = int(np.nanargmin(strain))
             raise InputError(
-                "a strain of -100 % or less is impossible",
+                f"a {quantity} of -100 % or less is impossible",
                 file=self.file,
                 key=f"row {rows[worst]}",
-                value=float(deformation[worst]),
-                expected="engineering strain above -1, compression negative",
+                value=float(strain[worst]),
+                expected=expected,
             )
 
     def _check_compression(self, deformation: Array, stress: Array, rows: Array) -> None:
@@ -335,17 +340,19 @@ class _Reading:
         if curve.lateral is None or not np.any(np.isfinite(curve.lateral)):
             return
         strain = curve.lateral - 1.0
+        self._check_possible(
+            strain, curve.rows, "lateral strain", "lateral strains above -1, lateral stretches above 0"
+        )
         widening = strain * curve.deformation
-        problem, expected, worst = "", "", 0
-        if np.nanmin(strain) <= -1.0:
-            problem, worst = "a lateral strain of -100 % or less is impossible", int(np.nanargmin(strain))
-            expected = "lateral strains above -1, lateral stretches above 0"
-        elif np.nansum(widening) > WIDENING * np.sum(curve.deformation**2):
-            problem, worst = "the specimen widens as it is stretched", int(np.nanargmax(widening))
-            expected = "contraction as a negative lateral strain, or a lateral stretch below 1"
-        if problem:
-            key = f"row {curve.rows[worst]}"
-            raise InputError(problem, file=self.file, key=key, value=float(f"{strain[worst]:.6g}"), expected=expected)
+        if np.nansum(widening) > WIDENING * np.sum(curve.deformation**2):
+            worst = int(np.nanargmax(widening))
+            raise InputError(
+                "the specimen widens as it is stretched",
+                file=self.file,
+                key=f"row {curve.rows[worst]}",
+                value=float(f"{strain[worst]:.6g}"),
+                expected="contraction as a negative lateral strain, or a lateral stretch below 1",
+            )
 
     def _check_pair(self, true: Column, expected: Array, quantity: str) -> None:
         """Refuse true values that contradict the engineering ones."""
