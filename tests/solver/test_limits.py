@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from samples import arch, neo_hookean, sphere
@@ -15,13 +17,14 @@ from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.structured import quarter_ring, rectangle, shell_octant
+from turgor.mesh.structured import box, quarter_ring, rectangle, shell_octant
+from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import ATMOSPHERE, Air, Volume
 from turgor.solver.events import Event
 from turgor.solver.follow import follow, follow_arc
-from turgor.solver.newton import Equilibrium
+from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError
 from turgor.solver.path import LimitPressureError, PathOptions, StoppedShortError, output_fractions, solve_path
-from turgor.solver.volume import is_monotone, stable_while_held
+from turgor.solver.volume import VolumeWalk, is_monotone, stable_while_held
 
 ONE = np.ones(1)
 LIMIT, MINIMUM = 1.12607e-4, 2.43356e-5
@@ -131,6 +134,40 @@ def test_a_limit_of_suction_is_found_where_it_is_whatever_the_sign_of_the_load(f
 def test_a_snap_that_hardly_changes_the_volume_is_not_jumped_over(times, steps):
     limit = stop(arch(times * SHALLOW, rise=0.75), steps).limit
     assert float(limit.equilibrium.state.loads[0]) == pytest.approx(SHALLOW, rel=1e-4)
+
+
+@pytest.mark.parametrize(("rise", "times", "steps"), [(0.6, 1.02, 1), (0.65, 1.1, 1), (0.56, 1.5, 3)])
+def test_a_snap_that_changes_the_volume_no_faster_than_what_follows_is_not_jumped_over(rise, times, steps):
+    system = arch(1.0, rise=rise)
+    (top, low) = (pressure for _, pressure in events(follow(system, Volume(ONE), volumes(system, 10.0, 20))))
+    assert low < top
+    limit = stop(arch(times * top, rise=rise), steps).limit
+    assert float(limit.equilibrium.state.loads[0]) == pytest.approx(top, rel=1e-4)
+
+
+@pytest.mark.parametrize(("rise", "top", "times"), [(0.65, 3.13172e-5, 1.3), (0.6, 2.74857e-5, 2.0)])
+def test_nor_is_it_by_iteration(rise, top, times):
+    block = box((10.0, 1.0, 0.4), (12, 1, 1), "hex27")
+    points = block.points + np.array([[0.0, 0.0, 1.0]]) * (rise * np.sin(np.pi * block.points[:, :1] / 20.0) - 10.0)
+    mesh = Mesh(points, block.cells, regions=block.regions, surfaces=block.surfaces)
+    held = [Clamped("x0"), Sliding("x1"), Sliding("y0"), Sliding("y1")]
+    system = System(mesh, {"body": neo_hookean(1.0, 1e3)}, held, [Pressure("z1", times * top)])
+    with pytest.raises(LimitPressureError) as stopped:
+        solve_path(system, [1.0], options=PathOptions(newton=NewtonOptions(linear="iterative")))
+    assert float(stopped.value.limit.equilibrium.state.loads[0]) == pytest.approx(top, rel=1e-3)
+
+
+def test_a_limit_that_is_none_is_not_located_where_its_ends_meet():
+    system = arch(1.0)
+    found: list[Equilibrium] = []
+    follow(system, Volume(ONE), volumes(system, 7.0, 14), on_equilibrium=found.append)
+    falling = [e for e in found if not e.rising]
+    walk = VolumeWalk(system, make_stiffness_solver(system, "auto"), falling[-3], 0.5, NewtonOptions(), Volume(ONE))
+    # As where rounding makes a state behind a limit look like one before it.
+    first = replace(falling[-3], compliance=1e12)
+    with pytest.raises(NotConvergedError, match="jumps"):
+        walk.limit_between(first, falling[-2])
+    assert walk.here is falling[-2]
 
 
 @pytest.mark.parametrize("part", [0.95, 0.999])

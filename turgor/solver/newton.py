@@ -44,6 +44,8 @@ class Equilibrium:
         What makes the state special on its path ; ``None`` for most.
     mode
         The eigenmode in which the tangent loses its stiffness there, ``(n_points, d)``, if the event has one.
+    expected
+        Change of the conjugate from the guess to here that the tangent at the guess expected.
     """
 
     state: State
@@ -54,6 +56,7 @@ class Equilibrium:
     compliance: float | None = None
     event: Event | None = None
     mode: Floats | None = None
+    expected: float = 0.0
 
     @property
     def iterations(self) -> int:
@@ -167,6 +170,8 @@ def find_equilibrium(
                 raise failure(reason, system, state, progress.residuals)
             tangent = Tangent(system, linear, state, fraction, control, line.growth, progress)
             step = tangent.solved(residual, pending if moving else None)
+            if len(progress.tangents) == 1:
+                progress.expected = -float(np.vdot(system.load_direction(state, line.growth), step.du))
         state, damping = _advanced(system, state, step, progress.residuals, search=control is None and not moving)
         # What a shortened step left of the given displacements is imposed by the next one.
         pending = (1.0 - damping) * pending
@@ -281,6 +286,7 @@ def _accepted(
         len(progress.tangents),
         tangent.inertia(),
         tangent.compliance,
+        expected=progress.expected,
     )
 
 

@@ -40,7 +40,7 @@ FAILURES = 2
 LARGE_CHANGE = 1.0
 STEEPER = 2.0
 """A step is asked whether it has jumped if it has changed the conjugate by more than this part of it, or so many times
-as fast as the step before (the first step: as what lies ahead of it).
+as fast as the step before (the first step: as the tangent at its start says).
 
 Where cavities are roomy, a wall that snaps changes the conjugate by little: a shallow arch by a twentieth, 16 times as
 fast as the step before. Before its limit it gives way up to twice as fast from step to step.
@@ -250,7 +250,7 @@ class _Walk:
         growth = system.loading.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
         mean = (after - before) / (found.fraction - here.fraction)
-        if abs(after - before) <= LARGE_CHANGE * abs(before) and not self._is_steep(mean, found, growth):
+        if abs(after - before) <= LARGE_CHANGE * abs(before) and not self._is_uneven(before, after, found, growth):
             return False
         at_end = compliance(system, linear, found.state, growth, growth)
         factorise_tangent(system, linear, here.state)
@@ -259,21 +259,33 @@ class _Walk:
             return False  # nothing gives way to the loads yet, as before a body is touched
         return not is_monotone(1.0 / mean, 1.0 / at_start, 1.0 / at_end)
 
-    def _is_steep(self, mean: float, found: Equilibrium, growth: Floats) -> bool:
-        """Whether the conjugate has changed much faster on a step than on the one before, or goes on to behind it.
+    def _is_uneven(self, before: float, after: float, found: Equilibrium, growth: Floats) -> bool:
+        """Whether the conjugate has changed unevenly on a step, or much faster than on the one before.
 
-        Without a step before, a further solution tells; by iteration it is not found. Where surfaces touch the path has
-        corners, which say nothing.
+        Where surfaces touch the path has corners, which say nothing.
         """
         if any(self.system.contact_force(e.state) > 0.0 for e in (self.here, found)):
             return False
+        size, change = found.fraction - self.here.fraction, after - before
+        return self._bends_back(before, change, size, found) or self._is_steep(change, size, found, growth)
+
+    def _bends_back(self, before: float, change: float, size: float, found: Equilibrium) -> bool:
+        """Whether the parabola with the conjugate's values at both ends of a step, and its mean, is not monotone.
+
+        The potential tells the mean: along a path of equilibria it falls by the conjugate.
+        """
+        fall = self.system.energy(self.here.state) - self.system.energy(found.state)
+        return abs(fall / size - before - 0.5 * change) > abs(change) / 6.0
+
+    def _is_steep(self, change: float, size: float, found: Equilibrium, growth: Floats) -> bool:
+        """Whether the conjugate has changed much faster than on the step before or, without one, than was expected."""
         if self.past:
             earlier, here = self.past[-1], self.here
-            change = self.system.conjugate(here.state, growth) - self.system.conjugate(earlier.state, growth)
-            return abs(mean) * (here.fraction - earlier.fraction) > STEEPER * abs(change)
-        if not self.linear.cheap_again:
-            return False
-        return abs(mean) > STEEPER * abs(compliance(self.system, self.linear, found.state, growth, growth))
+            last = self.system.conjugate(here.state, growth) - self.system.conjugate(earlier.state, growth)
+            expected = last * size / (here.fraction - earlier.fraction)
+        else:
+            expected = found.expected
+        return abs(change) > STEEPER * abs(expected)
 
     def _failed(self, size: float, target: float, error: NotConvergedError) -> Equilibrium | None:
         """Shorten the step; where that has not helped, and before the walk ends, go on by volume control."""

@@ -103,13 +103,15 @@ class Step:
 class Progress:
     """What an iteration has spent, and whether it is on its way to an equilibrium.
 
-    ``residuals`` before each iteration; of each tangent that was factorised, the residual and its negative pivots.
+    ``residuals`` before each iteration; of each tangent that was factorised, the residual and its negative pivots;
+    what the first one ``expected`` the conjugate of the load fraction to change by.
     """
 
     def __init__(self, options: NewtonOptions) -> None:
         self.options = options
         self.residuals: list[float] = []
         self.tangents: list[tuple[float, int]] = []
+        self.expected = 0.0
 
     @property
     def hopeless(self) -> str | None:

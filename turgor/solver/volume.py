@@ -51,6 +51,9 @@ SHORT_ENOUGH = 0.01
 FEW_CUTS = 4.0
 """So many smallest steps long, one that ends in an unstable state is tried shorter: it may be on another branch."""
 
+CLOSEST = 1e-10
+"""Part of themselves by which two volumes differ that rounding may make one."""
+
 STEEP = 1e-3
 """A state is no limit where the load changes by more than this part of itself over the step that holds it."""
 
@@ -250,6 +253,8 @@ class VolumeWalk:
         nearer, slope = 1.0, np.inf
         for _ in range(30):
             (q0, s0, e0), (q1, s1, e1) = ends
+            if abs(q1 - q0) <= CLOSEST * abs(q0):
+                break
             self.stand_at(e1, e0, third)
             aim = q0 + nearer * min(max(s0 / (s0 - s1), 0.05), 0.95) * (q1 - q0)
             try:
