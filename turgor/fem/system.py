@@ -15,7 +15,7 @@ from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
-from turgor.fem.contact.spec import ContactCase, RigidContact, led, make_contact
+from turgor.fem.contact.spec import ContactCase, RigidContact, led, make_contact, mirrors
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -103,7 +103,8 @@ class System:
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.bending = [FibreBending(mesh, embedded) for embedded in self.fibres if embedded.resists_bending]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
-        self.contacts = [self._contact(materials, case, number) for number, case in enumerate(contact)]
+        self.contacts: list[Contact] = [self._contact(materials, case, number) for number, case in enumerate(contact)]
+        self.contacts += mirrors(mesh, materials, contact, self._largest_pressure, section)
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.bending, *self.membranes, *self.families)
         self.terms: tuple[Term, ...] = (
@@ -371,10 +372,13 @@ class System:
         return nodes, packed
 
     def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
-        loads = self.loading.loads
-        pressure = max((abs(load.value) for load in loads if isinstance(load, Pressure)), default=0.0)
-        channel = loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
+        channel = self.loading.loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
+        pressure = self._largest_pressure
         return make_contact(self.mesh, materials, case, pressure, channel, self.section, number, self._row(case))
+
+    @property
+    def _largest_pressure(self) -> float:
+        return max((abs(load.value) for load in self.loading.loads if isinstance(load, Pressure)), default=0.0)
 
     @property
     def _rest(self) -> Floats:

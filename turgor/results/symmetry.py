@@ -14,15 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.fem.section import Section, surface_areas
-from turgor.mesh.cells import face_cell, face_fluxes
+from turgor.mesh.cells import face_cell
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.symmetry import planes_of_symmetry
 
 FloatArray = npt.NDArray[np.float64]
 
 MOUNT, TIP_FACE = "mount", "tip-face"
-
-_PARALLEL = float(np.cos(np.radians(1.0)))
-"""Cosine of the angle by which faces of one plane of symmetry may look aside."""
 
 _MOST = 360
 """Images, the body among them; planes at an angle that no circle is a multiple of would have images without end."""
@@ -111,17 +109,7 @@ def _mirrors(mesh: Mesh) -> Iterator[tuple[FloatArray, FloatArray]]:
     One that touches only one of them, or neither, lies across the body: behind it are other cross-sections.
     """
     ends = [mesh.surface_nodes(name) for name in (MOUNT, TIP_FACE)]
-    # A surface may have the cuts of two planes, and a plane two surfaces.
-    faces = np.concatenate([mesh.surface(name) for name in mesh.symmetry_planes] or [np.empty((0, 3), np.int32)])
-    while len(faces):
-        normals = face_fluxes(mesh.points[faces])[1]
-        sizes = np.linalg.norm(normals, axis=1)
-        largest = int(np.argmax(sizes))
-        cosines = normals @ normals[largest] / (sizes * sizes[largest])
-        parallel = np.abs(cosines) >= _PARALLEL
-        if all(np.isin(faces[parallel], nodes).any() for nodes in ends):
-            normal = np.sign(cosines[parallel]) @ normals[parallel]
-            normal /= np.linalg.norm(normal)
-            offset = mesh.points[faces[largest]].mean(axis=0) @ normal
-            yield np.eye(mesh.dimension) - 2.0 * np.outer(normal, normal), 2.0 * offset * normal
-        faces = faces[~parallel]
+    for plane in planes_of_symmetry(mesh):
+        if all(np.isin(plane.faces, nodes).any() for nodes in ends):
+            n = plane.normal
+            yield np.eye(mesh.dimension) - 2.0 * np.outer(n, n), 2.0 * (plane.point @ n) * n

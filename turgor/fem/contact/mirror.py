@@ -1,0 +1,134 @@
+"""Contact of the skin with its mirror image behind a plane of symmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from turgor.common.errors import InputError
+from turgor.fem.contact.friction import WIDTH
+from turgor.fem.contact.skin import STIFFNESS, Skin
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, Touch
+from turgor.fem.pattern import packed_size
+from turgor.fem.state import State
+from turgor.fem.term import NO_NODES, Unlagged, add_at_nodes, pack_symmetric
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.symmetry import SymmetryPlane
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+IN_PLANE = 1e-3
+"""Part of the body's extent by which what lies in a plane may be off it."""
+
+
+class Mirror(Unlagged):
+    """Σ ε w min(0, h)² over the quadrature points of the skin, h their height in front of a plane of symmetry.
+
+    The image pushes as another wall would that the skin overlaps by 2 h, ½ of ½ ε w (2 h)² being the skin's own
+    (:class:`turgor.fem.contact.surfaces.SurfaceContact`). It slides along with the skin: there is no friction.
+
+    Parameters
+    ----------
+    skin
+        The faces that may touch their image; none in the plane.
+    plane
+        The plane of symmetry.
+    name
+        Of the contact.
+    """
+
+    nodes = NO_NODES
+    friction = 0.0
+
+    def __init__(self, skin: Skin, plane: SymmetryPlane, name: str) -> None:
+        self.skin = skin
+        self.name = name
+        self._inward = -plane.normal
+        self._height = plane.height(skin.points[:, : skin.dimension])
+
+    def energy(self, state: State) -> float:
+        """Return the energy, N mm."""
+        return 0.5 * float(np.sum(self._stiffness(state) * np.minimum(self._heights(state.u), 0.0) ** 2))
+
+    def force(self, state: State, out: Floats) -> None:
+        """Add the contact forces, N."""
+        force = (self._stiffness(state) * np.minimum(self._heights(state.u), 0.0)) @ self.skin.shape
+        touching = np.flatnonzero(force.any(axis=1))
+        add_at_nodes(self.skin.faces[touching], force[touching][:, :, None] * self._inward, out)
+
+    def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
+        """Fill nothing: all of the stiffness is in :meth:`blocks`."""
+
+    def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
+        """Return the nodes of each face that is behind the plane and the packed stiffnesses."""
+        del lagged
+        height, shape, n = self._heights(state.u), self.skin.shape, self._inward
+        touching = np.flatnonzero((height < 0.0).any(axis=1))
+        stiffness = self._stiffness(state)[touching] * (height[touching] < 0.0)
+        full = np.einsum("fq,qa,qb,i,j->faibj", stiffness, shape, shape, n, n, optimize=True)
+        rows = full.shape[1] * full.shape[2]
+        packed = np.empty((len(touching), packed_size(rows)))
+        pack_symmetric(full.reshape(len(touching), rows, rows), packed)
+        return self.skin.faces[touching], packed
+
+    def couplings(self, u: Floats) -> Ints:
+        """Return nothing: the nodes of a face are coupled anyway."""
+        del u
+        return self.skin.faces[:0]
+
+    def longest_step(self, state: State, du: Floats) -> float:
+        """Return the part of the step `du` up to which no overlap grows too much."""
+        room = np.maximum(self._heights(state.u), 0.0) + 0.5 * GROWTH_OF_OVERLAP * self.skin.depth[:, None]
+        rate = self._at_points((du @ self._inward)[: len(self._height)])
+        return 1.0 / max(1.0, float((-rate / room).max()))
+
+    def touch(self, state: State) -> Touch:
+        """Return area and overlaps."""
+        height = self._heights(state.u)
+        overlap = 2.0 * np.maximum(-height, 0.0)
+        return Touch(
+            self.name,
+            area=float(self.skin.area[height < 0.0].sum()),
+            overlap=float(overlap.max()),
+            overlap_per_wall=float((overlap / self.skin.wall[:, None]).max()),
+        )
+
+    def intersects(self, state: State) -> None:
+        """Say nothing: there is no independent look at overlaps with a plane."""
+        del state
+
+    def gripped(self, state: State, *, dragged: bool) -> Floats:
+        """Return nothing: the image slides along with the skin."""
+        del state, dragged
+        return np.empty((0, WIDTH))
+
+    def _heights(self, u: Floats) -> Floats:
+        """Return the heights of the quadrature points ``(k, q)``, mm."""
+        return self._at_points(self._height + (u @ self._inward)[: len(self._height)])
+
+    def _at_points(self, at_nodes: Floats) -> Floats:
+        return np.asarray(at_nodes[self.skin.faces] @ self.skin.shape.T)
+
+    def _stiffness(self, state: State) -> Floats:
+        return np.asarray(2.0 * state.penalty * STIFFNESS * (self.skin.load / self.skin.grip)[:, None] * self.skin.area)
+
+
+def in_front(mesh: Mesh, plane: SymmetryPlane, faces: Ints) -> Ints:
+    """Return the faces that do not lie in a plane of symmetry.
+
+    Raises
+    ------
+    InputError
+        If the body reaches through the plane, so that behind it is no mirror image.
+    """
+    height = plane.height(mesh.points)
+    off = IN_PLANE * float(np.ptp(mesh.points, axis=0).max())
+    if height.min() < -off:
+        raise InputError(
+            "the body reaches through its plane of symmetry, so that it cannot meet its mirror image",
+            key="contact",
+            value=f"{-height.min():.4g} mm behind it at {mesh.points[height.argmin()].round(3).tolist()} mm",
+            expected="a body on one side of each surface 'symmetry…', or another name of the surface",
+        )
+    return faces[(height[faces] > off).any(axis=1)]

@@ -1,0 +1,61 @@
+"""The planes in which a mesh is cut, and behind which the body goes on as its mirror image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from turgor.mesh.cells import face_fluxes
+from turgor.mesh.mesh import Mesh
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
+
+_PARALLEL = float(np.cos(np.radians(1.0)))
+"""Cosine of the angle by which faces of one plane of symmetry may look aside."""
+
+_OFF = 1e-3
+"""Part of the mesh's extent by which they may lie off it."""
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetryPlane:
+    """A plane of symmetry.
+
+    Attributes
+    ----------
+    point
+        A point of it, ``(d,)``, mm.
+    normal
+        Unit normal out of the body, ``(d,)``.
+    faces
+        The faces that lie in it, ``(k, n)``.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+    faces: IntArray
+
+    def height(self, places: FloatArray) -> FloatArray:
+        """Return how far `places` ``(..., d)`` are in front of the plane, on the body's side, mm."""
+        return np.asarray((self.point - places) @ self.normal)
+
+
+def planes_of_symmetry(mesh: Mesh) -> Iterator[SymmetryPlane]:
+    """Yield each plane that the surfaces ``symmetry…`` of a mesh lie in, the one of the largest face first."""
+    # A surface may have the cuts of two planes, and a plane two surfaces.
+    faces = np.concatenate([mesh.surface(name) for name in mesh.symmetry_planes] or [np.empty((0, 3), np.int32)])
+    off = _OFF * float(np.ptp(mesh.points, axis=0).max())
+    while len(faces):
+        normals = face_fluxes(mesh.points[faces])[1]
+        sizes = np.linalg.norm(normals, axis=1)
+        largest = int(np.argmax(sizes))
+        middles = mesh.points[faces].mean(axis=1)
+        looks_alike = normals @ normals[largest] >= _PARALLEL * sizes * sizes[largest]
+        here = looks_alike & (np.abs((middles - middles[largest]) @ normals[largest]) <= off * sizes[largest])
+        normal = normals[here].sum(axis=0)
+        yield SymmetryPlane(middles[largest], normal / np.linalg.norm(normal), faces[here])
+        faces = faces[~here]
