@@ -19,7 +19,7 @@ from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, quarter_ring
 from turgor.solver.path import output_fractions, solve_path
 
-SUCTION = -2e-4
+SUCTION = -6e-4
 
 
 def quarter() -> Mesh:
@@ -69,8 +69,8 @@ def test_a_wall_that_is_sucked_in_meets_its_image_as_it_meets_another_wall():
     # So soft a bed holds it where it is, and nothing else.
     whole, of_half = inflated(half(), [Sliding("symmetry"), ElasticSupport("outer", 1e-9)])
     assert of_quarter == pytest.approx(0.5 * of_half, rel=1e-3)
-    # Without the image the walls pass through each other, and a quarter of this is left.
-    assert of_quarter[-1] > 12.0
+    # Walls that pass through each other leave a negative volume.
+    assert of_quarter[-1] > 6.0
     assert [c.name for c in whole.contacts] == ["self", "self:mirror"]
     assert whole.touches(whole.reference_state())[0].area == 0.0
 

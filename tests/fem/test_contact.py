@@ -20,6 +20,7 @@ from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
 from turgor.mesh.cells import CELLS
 from turgor.mesh.faces import boundary_faces
+from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, shell_octant
 
 BODIES = {
@@ -40,6 +41,11 @@ def stacked(gap: float, kind: str) -> System:
     mesh = merged(low=low, high=shifted_mesh(high, 0.4, 0.35, 1.0 + gap))
     contact = [SelfContact(), RigidContact(BODIES["sphere"], motion=(0.1, 0.0, 0.1))]
     return System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("low-z0"), Clamped("high-z1")], contact=contact)
+
+
+def with_skin(mesh: Mesh) -> Mesh:
+    """The same mesh, its whole skin a surface."""
+    return Mesh(mesh.points, mesh.cells, surfaces={**mesh.surfaces, "skin": boundary_faces(mesh.cells)})
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -193,8 +199,28 @@ def test_kernels_know_the_faces_of_meshes_and_balls_hold_them(name):
     assert radius[0] == pytest.approx(np.linalg.norm(flat - centre, axis=1).max())
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_surface_may_meet_itself(kind):
+    pair = stacked(0.3, kind)
+    mesh = Mesh(
+        pair.mesh.points, pair.mesh.cells, surfaces={**pair.mesh.surfaces, "skin": boundary_faces(pair.mesh.cells)}
+    )
+    held = [Clamped("low-z0"), Clamped("high-z1")]
+    found = []
+    for case in (PairContact("skin", "skin"), SelfContact()):
+        system = System(mesh, {"body": neo_hookean(ratio=20)}, held, contact=[case])
+        (contact,) = system.contacts
+        rest = system.reference_state()
+        assert contact.intersects(rest) is not True
+        down = np.where(mesh.points[:, 2:] > 1.2, -0.32, 0.0) * [0.0, 0.0, 1.0]
+        found.append(contact.energy(system.consistent(down, rest.loads)))
+    assert found[0] == found[1] > 0.0
+
+
 def test_refusals():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    with pytest.raises(InputError, match=r"share faces.*'x0:skin'"):
+        System(with_skin(mesh), {"body": neo_hookean()}, [Clamped("x1")], contact=[PairContact("x0", "skin")])
     for case in (PairContact("x0", "nowhere"), RigidContact(Sphere((0, 0, 0), 1.0), "nowhere")):
         with pytest.raises(InputError, match="nowhere"):
             System(mesh, {"body": neo_hookean()}, [Clamped("x0")], contact=[case])

@@ -27,6 +27,11 @@ class RigidBody(Protocol):
         """The point ``(d,)`` that torque is taken about, mm."""
         ...
 
+    @property
+    def depth(self) -> float:
+        """How deep inside it a point may be, mm: farther on it comes out on the other side."""
+        ...
+
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the signed distance of points ``(n, d)`` and its derivatives.
 
@@ -57,6 +62,11 @@ class Plane:
         """The given point."""
         return np.asarray(self.point, float)
 
+    @property
+    def depth(self) -> float:
+        """Without end."""
+        return np.inf
+
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the height over the plane; see :meth:`RigidBody.distance`."""
         normal = _unit(self.normal)
@@ -83,6 +93,11 @@ class Sphere:
     def reference_point(self) -> Floats:
         """The centre."""
         return np.asarray(self.centre, float)
+
+    @property
+    def depth(self) -> float:
+        """The radius."""
+        return self.radius
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the distance from the surface; see :meth:`RigidBody.distance`."""
@@ -111,6 +126,11 @@ class Cylinder:
     def reference_point(self) -> Floats:
         """The middle of the axis."""
         return np.asarray(np.add(self.start, self.end) / 2, float)
+
+    @property
+    def depth(self) -> float:
+        """The radius, or half of the length if that is less."""
+        return min(self.radius, 0.5 * float(np.linalg.norm(np.subtract(self.end, self.start))))
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the distance from the mantle or the nearer end; see :meth:`RigidBody.distance`."""
@@ -152,6 +172,11 @@ class Box:
     def reference_point(self) -> Floats:
         """The centre."""
         return np.asarray(np.add(self.lower, self.upper) / 2, float)
+
+    @property
+    def depth(self) -> float:
+        """Half of the shortest edge."""
+        return 0.5 * float(np.min(np.subtract(self.upper, self.lower)))
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the distance from the nearest face's plane; see :meth:`RigidBody.distance`."""

@@ -311,12 +311,21 @@ class System:
         """Return the part of Newton's step `du`, at most 1, up to which no surfaces overlap too far to be seen."""
         return min((contact.longest_step(state, du) for contact in self.contacts), default=1.0)
 
+    def longest_advance(self, state: State, growth: Floats) -> float:
+        """Return how much the load fraction may grow before a rigid body that moves could be past what it meets."""
+        speeds = [(pushed, abs(float(growth[pushed.channel]))) for pushed in self._pushed]
+        return min((pushed.longest_motion(state) / speed for pushed, speed in speeds if speed > 0.0), default=np.inf)
+
     def seen_to_overlap(self, state: State) -> bool:
         """Whether an independent look finds surfaces that overlap more than is allowed; no where it is not possible.
 
         Surfaces that a barrier keeps apart are not looked at.
         """
         return any(contact.intersects(state) is True for contact in self.contacts if not isinstance(contact, Barrier))
+
+    def have_passed(self, before: State, after: State) -> bool:
+        """Whether an independent look finds surfaces that overlap in one state, and did not before."""
+        return self.seen_to_overlap(after) and not self.seen_to_overlap(before)
 
     def touches(self, state: State) -> list[Touch]:
         """Return how each contact stands."""

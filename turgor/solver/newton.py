@@ -75,7 +75,7 @@ class Equilibrium:
 
 
 SMALLEST_DAMPING = 1 / 32
-TRIALS = 5
+TRIALS = 10
 """Lengths of a step that a line search tries."""
 
 LESS = 0.9

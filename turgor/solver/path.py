@@ -190,8 +190,9 @@ class _Walk:
         """Walk to the load fraction `target`."""
         self._failures = 0
         while self.here.fraction < target:
-            aim = min(target, self.here.fraction + self.step)
-            if target - aim < 0.2 * self.step:
+            step = self._longest_step()
+            aim = min(target, self.here.fraction + step)
+            if target - aim < 0.2 * step:
                 aim = target
             found = self._try(aim, target)
             if found is not None:
@@ -204,6 +205,12 @@ class _Walk:
         if target in self.system.loading.kinks:
             # Beyond it the path turns: what lies before says nothing of the direction.
             self.past = ()
+
+    def _longest_step(self) -> float:
+        """Return the length of the next step, less where a rigid body moves that could pass what it is to meet."""
+        here = self.here
+        advance = self.system.longest_advance(here.state, self.system.loading.growth(here.fraction))
+        return min(self.step, max(advance, self.options.smallest_step))
 
     def _arrive(self, found: Equilibrium) -> None:
         self.here = found
@@ -222,6 +229,10 @@ class _Walk:
         if found.stable is False and self.here.stable is not False and size > 4 * self.options.smallest_step:
             # A long step can land on an unstable branch that a shorter one would not have met.
             log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
+            self.step = CUT * size
+            return None
+        if size > 4 * self.options.smallest_step and self.system.have_passed(self.here.state, found.state):
+            log.info("on the step to %.4g surfaces passed into each other; trying a shorter one", aim)
             self.step = CUT * size
             return None
         if self._may_have_jumped(found):

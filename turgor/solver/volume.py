@@ -49,7 +49,8 @@ SHORT_ENOUGH = 0.01
 """Part of the first step below which a step is not shortened for what it may hide."""
 
 FEW_CUTS = 4.0
-"""So many smallest steps long, one that ends in an unstable state is tried shorter: it may be on another branch."""
+"""So many smallest steps long, one that ends in an unstable state is tried shorter: it may be on another branch. So is
+one on which surfaces passed into each other."""
 
 CLOSEST = 1e-10
 """Part of themselves by which two volumes differ that rounding may make one."""
@@ -196,6 +197,9 @@ class VolumeWalk:
             return True
         if self.loses_stability(self.here, found) and part > FEW_CUTS * self.smallest_part:
             log.info("the step ended in an unstable state")
+            return True
+        if part > FEW_CUTS * self.smallest_part and self.system.have_passed(self.here.state, found.state):
+            log.info("on the step surfaces passed into each other")
             return True
         return False
 

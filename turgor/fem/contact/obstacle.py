@@ -17,6 +17,9 @@ from turgor.mesh.mesh import in_space
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+PART_OF_DEPTH = 0.5
+"""Part of its depth by which a body that moves may get into another at once: beyond the middle it would push it on."""
+
 
 class Obstacle:
     """½ Σ ε w min(0, d)² over the quadrature points of the skin, d the signed distance from a rigid body.
@@ -152,7 +155,7 @@ class Obstacle:
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much."""
         gap, normal, _ = self._gaps(state.u, state.loads)
-        growth = GROWTH_OF_OVERLAP * self.skin.depth[:, None]
+        growth = GROWTH_OF_OVERLAP * np.minimum(self.skin.depth, self.body.depth)[:, None]
         rate = np.einsum("fqi,fqi->fq", normal, self._at_points(du))
         room = np.maximum(gap, 0.0) + growth
         step = 1.0 / max(1.0, float((-rate / room).max()))
@@ -163,6 +166,13 @@ class Obstacle:
                 break
             step *= 0.5
         return step
+
+    def longest_motion(self, state: State) -> float:
+        """Return how much its factor may grow before the body could be past what it is to meet."""
+        way = float(np.linalg.norm(self.motion))
+        gap, _, _ = self._gaps(state.u, state.loads)
+        room = max(float(gap.min()), 0.0) + PART_OF_DEPTH * self.body.depth
+        return room / way if way > 0.0 else np.inf
 
     def touch(self, state: State) -> Touch:
         """Return area, overlaps, and force and torque on the body."""

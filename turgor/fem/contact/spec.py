@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.common.rows import row_numbers
 from turgor.fem.contact.barrier import REACH, Barrier
 from turgor.fem.contact.hull import hull
 from turgor.fem.contact.mirror import Mirror, in_front
@@ -61,7 +62,7 @@ class SelfContact:
 
 @dataclass(frozen=True)
 class PairContact:
-    """Two surfaces of the mesh may meet each other; friction and method as for :class:`SelfContact`."""
+    """Two surfaces of the mesh, or one and itself, may meet; friction and method as for :class:`SelfContact`."""
 
     first: str
     second: str
@@ -189,12 +190,8 @@ def make_contact(
             around = hull(body, mesh.points, error, f"contact.{case.name}")
             return Barrier(skin, None, case.name, section, around, node)
         return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number, node)
-    if isinstance(case, PairContact):
-        first, second = mesh.surface(case.first), mesh.surface(case.second)
-        group = np.repeat(np.array([0, 1], np.int32), [len(first), len(second)])
-        skin = Skin(mesh, np.vstack([first, second]), materials, pressure, section)
-    else:
-        group, skin = None, Skin(mesh, _whole(mesh, section), materials, pressure, section)
+    faces, group = _meeting(mesh, case, section)
+    skin = Skin(mesh, faces, materials, pressure, section)
     if barrier:
         return Barrier(skin, group, case.name, section)
     return SurfaceContact(skin, group, case.name, case.friction, number)
@@ -258,6 +255,24 @@ def _check(case: ContactCase) -> None:
             value=case.motion,
             expected="a motion or a spring, or method: penalty",
         )
+
+
+def _meeting(mesh: Mesh, case: SelfContact | PairContact, section: Section | None) -> tuple[Ints, Ints | None]:
+    """Return the faces that may meet and the group of each; without groups any may meet any."""
+    if isinstance(case, SelfContact):
+        return _whole(mesh, section), None
+    if case.first == case.second:
+        return mesh.surface(case.first), None
+    both = [mesh.surface(name) for name in (case.first, case.second)]
+    faces = np.vstack(both)
+    if len(np.unique(row_numbers(np.sort(faces, axis=1)))) < len(faces):
+        raise InputError(
+            "two surfaces that may touch each other share faces",
+            key="contact.pairs",
+            value=case.name,
+            expected="surfaces apart from each other, a surface with itself, or self: true",
+        )
+    return faces, np.repeat(np.array([0, 1], np.int32), [len(part) for part in both])
 
 
 def _whole(mesh: Mesh, section: Section | None) -> Ints:

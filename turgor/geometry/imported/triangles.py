@@ -54,6 +54,7 @@ class TriangleBody:
         self._normals = _normals(faces, self._corners, area_normal / size[:, None], opposite, len(corners))
         self._tree = box_tree(self._corners)
         self._middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        self._depth = 2.0 * volume / float(size.sum())
 
     @classmethod
     def from_stl(cls, path: str | Path) -> TriangleBody:
@@ -71,6 +72,11 @@ class TriangleBody:
     def reference_point(self) -> Floats:
         """The middle of the box around the body."""
         return np.asarray(self._middle)
+
+    @property
+    def depth(self) -> float:
+        """Volume over surface: of a plate half of its thickness, of a ball a third of its radius."""
+        return self._depth
 
     def distance(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the signed distance ``(n,)``, mm, negative inside, its gradient and its second derivative."""
