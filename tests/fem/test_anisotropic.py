@@ -8,7 +8,9 @@ from samples import check_derivatives, neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.fem.anisotropic import ExponentialFibres, FibreFamily, QuadraticFibres
+from turgor.fem.constitutive import COL, ROW
 from turgor.fem.directions import Constant, Helical
+from turgor.fem.fields import von_mises
 from turgor.fem.loads import Pressure
 from turgor.fem.section import PlaneStrain
 from turgor.fem.supports import Clamped, Prescribed, Sliding
@@ -85,6 +87,44 @@ def test_a_bar_along_its_fibres_follows_the_closed_form(law, kappa):
     added = law.derivatives(np.array(E))[1] * slope
     assert pull == pytest.approx(0.1 * (s - s**-2) + float(added), rel=1e-3)
     assert system.families[0].stretch(found.state.u) == pytest.approx(1.4, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kappa", [0.0, 0.15])
+def test_the_stress_of_a_bar_is_what_matrix_and_fibres_carry_together(law, kappa):
+    # Uniaxial and incompressible: σ = λ P = μ (λ² − 1/λ) + λ ψ'(E) dE/dλ, a third of it the mean stress.
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    fibres = family(law, Constant((2.0, 0.0, 0.0)), dispersion=kappa)
+    system = System(mesh, {"body": neo_hookean()}, [*PLANES, Prescribed("x1", (0.4, None, None))], [], [fibres])
+    state = solve_path(system, [1.0])[0].state
+    s = 1.4
+    E = kappa * (s**2 + 2 / s - 3) + (1 - 3 * kappa) * (s**2 - 1)
+    slope = kappa * (2 * s - 2 / s**2) + (1 - 3 * kappa) * 2 * s
+    stress = 0.1 * (s**2 - 1 / s) + s * float(law.derivatives(np.array(E))[1]) * slope
+    found = von_mises(system, state)
+    np.testing.assert_allclose(found.nodal, stress, rtol=1e-3)
+    assert found.largest == pytest.approx(stress, rel=1e-3)
+    np.testing.assert_allclose(system.element_pressure(state), stress / 3.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize("tension_only", [False, True])
+def test_the_stress_of_fibres_does_the_work_of_their_forces(tension_only):
+    # f_a = ∫ σ F⁻ᵀ ∂N_a/∂X J dV.
+    mesh = tube_sector(1.0, 1.5, 0.5, 1)
+    fibres = family(LAWS[1], Helical(0.7), dispersion=0.1, tension_only=tension_only)
+    system = System(mesh, {"body": neo_hookean()}, [Clamped("z0")], [], [fibres])
+    state, (term,), (solid,) = random_state(system, 0.01), system.families, system.solids
+    stored = system.cauchy_stress(solid, state) - solid.cauchy_stress(state)
+    stress = np.empty((*stored.shape[:2], 3, 3))
+    stress[..., ROW, COL] = stress[..., COL, ROW] = stored
+    F = np.eye(3) + np.einsum("eai,eqja->eqij", state.u[solid.nodes], solid.G)
+    spatial = np.linalg.inv(F).swapaxes(-1, -2) @ solid.G
+    volume = np.linalg.det(F) * solid.dV
+    expected, forces = np.zeros_like(state.u), np.zeros_like(state.u)
+    np.add.at(expected, solid.nodes, np.einsum("eqij,eqja,eq->eai", stress, spatial, volume))
+    term.force(state, forces)
+    assert np.abs(forces).max() > 1e-3
+    np.testing.assert_allclose(forces, expected, atol=1e-12)
 
 
 def test_oblique_fibres_shear_a_pulled_block_towards_themselves():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.fem.constitutive import COL, ROW
 from turgor.fem.directions import Direction
 from turgor.fem.kernels import parallel
 from turgor.fem.solid import Solid
@@ -139,12 +140,19 @@ class SpreadFibres(Mixed):
         if not 0.0 <= family.dispersion <= 1.0 / 3.0:
             raise InputError("the dispersion is out of bounds", key=key, value=family.dispersion, expected="0 to 1/3")
         self.family = family
+        self.solid = solid
         self.nodes = solid.nodes
         self.direction = _directions(mesh.points[solid.nodes], body_cell(solid.nodes).shape_at_quadrature, family)
         self._G, self._dV = solid.G, solid.dV
         kappa = family.dispersion
         dyad = self.direction[..., :, None] * self.direction[..., None, :]
         self._H = kappa * np.eye(3) + (1.0 - 3.0 * kappa) * dyad
+
+    @property
+    def modulus(self) -> float:
+        """What they add to Young's modulus along their direction at small strain, 4 (1 − 3κ)² d²ψ/dE², MPa."""
+        _, _, second = self.family.law.derivatives(np.zeros(1))
+        return 4.0 * (1.0 - 3.0 * self.family.dispersion) ** 2 * float(second[0])
 
     def stretch(self, u: Floats) -> Floats:
         """Return the stretch along the direction at the quadrature points, ``(m, q)``."""
@@ -153,6 +161,13 @@ class SpreadFibres(Mixed):
     def stress(self, u: Floats) -> Floats:
         """Return the second Piola–Kirchhoff stress along the fibres, 2 dψ/dE, ``(m, q)``, MPa."""
         return 2.0 * self._law(self._strain(self._deformation(u)))[1]
+
+    def cauchy_stress(self, state: State) -> Floats:
+        """Return their share of the Cauchy stress, 2 dψ/dE F H Fᵀ / J, as the solid does: ``(m, q, 6)``, MPa."""
+        F = self._deformation(state.u)
+        _, first, _ = self._law(self._strain(F))
+        pushed = F @ self._H @ F.swapaxes(-1, -2)
+        return np.asarray((2.0 * first / np.linalg.det(F))[..., None] * pushed[..., ROW, COL])
 
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""

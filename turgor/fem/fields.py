@@ -43,7 +43,7 @@ def von_mises(system: System, state: State) -> VonMises:
     cell = system.mesh.cell
     extrapolate = extrapolation(cell, cell.nodes)
     for solid in system.solids:
-        at_points = _von_mises(solid.cauchy_stress(state))
+        at_points = _von_mises(system.cauchy_stress(solid, state))
         at_nodes = np.maximum(at_points @ extrapolate.T, 0.0)
         share = np.repeat(solid.volume[:, None], solid.nodes.shape[1], axis=1)
         nodal += np.bincount(solid.nodes.ravel(), (share * at_nodes).ravel(), minlength=len(nodal))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from turgor.fem.constitutive import COL, ROW
 from turgor.fem.fields import extrapolation, weighted_percentile
 from turgor.fem.section import surface_areas
-from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.mesh.cells import face_cell, face_frames
@@ -29,9 +28,9 @@ class Interface:
     """The faces that two regions have in common.
 
     The traction is σ n, n the normal of the deformed face out of the softer region and σ the Cauchy stress of that
-    region, continued linearly from the quadrature points of each element to the face. Across the interface the traction
-    is continuous; the stiffer side, whose stresses along the face are larger in the ratio of the moduli, would know
-    it less precisely by that ratio.
+    region with its fibre families, continued linearly from the quadrature points of each element to the face. Across
+    the interface the traction is continuous; the stiffer side, whose stresses along the face are larger in the ratio of
+    the moduli, would know it less precisely by that ratio.
 
     Parameters
     ----------
@@ -46,7 +45,7 @@ class Interface:
     def __init__(self, system: System, softer: str, stiffer: str, rows: Ints) -> None:
         self.name = interface_name(softer, stiffer)
         self._points = system.mesh.points
-        self._solid = _solid(system, softer)
+        self._system, self._solid = system, system.solid_of(softer)
         self.faces = np.ascontiguousarray(all_faces(self._solid.nodes)[rows])
         cell = system.mesh.cell
         self._host, side = np.divmod(rows, len(cell.faces))
@@ -58,7 +57,7 @@ class Interface:
     def traction(self, state: State) -> tuple[Floats, Floats]:
         """Return the traction and the unit normal at the quadrature points of the faces, each ``(k, q, d)``; MPa."""
         d = self._points.shape[1]
-        stored = self._continued @ self._solid.cauchy_stress(state)[self._host]
+        stored = self._continued @ self._system.cauchy_stress(self._solid, state)[self._host]
         stress = np.empty((*stored.shape[:2], 3, 3))
         stress[:, :, ROW, COL] = stored
         stress[:, :, COL, ROW] = stored
@@ -84,15 +83,16 @@ class Interface:
 def interfaces(system: System) -> list[Interface]:
     """Return the interfaces of all regions that touch."""
     found = []
-    modulus = {name: _solid(system, name).material.shear_modulus for name in system.mesh.regions}
+    modulus = {name: _modulus(system, name) for name in system.mesh.regions}
     for pair in itertools.combinations(system.mesh.regions, 2):
         softer, stiffer = sorted(pair, key=modulus.__getitem__)
-        rows = shared_faces(_solid(system, softer).nodes, _solid(system, stiffer).nodes)
+        rows = shared_faces(system.solid_of(softer).nodes, system.solid_of(stiffer).nodes)
         if len(rows):
             found.append(Interface(system, softer, stiffer, rows))
     return found
 
 
-def _solid(system: System, region: str) -> Solid:
-    cells = system.mesh.region(region)
-    return next(solid for solid in system.solids if np.array_equal(solid.index, cells))
+def _modulus(system: System, region: str) -> float:
+    """Return Young's modulus of a region at small strain, MPa, along its fibre families if it has any."""
+    solid = system.solid_of(region)
+    return 3.0 * solid.material.shear_modulus + sum(family.modulus for family in system.families_in(solid))

@@ -59,13 +59,6 @@ class Sheet(Solid):
         ratio: Floats = np.einsum("mq,mq->m", self._now.J, self.dV) / self.volume
         return ratio
 
-    def mean_pressure(self, state: State, lagged: Floats) -> Floats:
-        """Return the mean of U'(J) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
-        del lagged
-        self._deform(state.u)
-        mean: Floats = np.einsum("mq,mq->m", self.material.volumetric.pressure(self._now.J), self.dV) / self.volume
-        return mean
-
     def _modes(self, nodes: Floats) -> Floats:
         return np.empty((*self.dV.shape, 0))
 

@@ -225,15 +225,11 @@ class Solid(Mixed):
         del state
         return lagged[:, 0]
 
-    def mean_pressure(self, state: State, lagged: Floats) -> Floats:
-        """Return the mean of U'(θ) over each element, ``(m,)``, MPa: its mean stress, positive in tension."""
-        del state
-        pressure = self._pressure(self._lagged_dilatation(lagged))
-        mean: Floats = np.einsum("mq,mq->m", pressure, self.dV) / self.volume
-        return mean
-
     def cauchy_stress(self, state: State) -> Floats:
-        """Return the Cauchy stress at the quadrature points in the stored symmetric order, ``(m, q, 6)``, MPa."""
+        """Return the Cauchy stress at the quadrature points in the stored symmetric order, ``(m, q, 6)``, MPa.
+
+        Without that of fibre families, which :meth:`turgor.fem.system.System.cauchy_stress` adds.
+        """
         self._deform(state.u)
         self._respond()
         stress = self._now.tau / self._now.J[:, :, None]

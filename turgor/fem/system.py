@@ -338,11 +338,35 @@ class System:
             dilatation[solid.index] = solid.dilatation(state, values)
         return dilatation
 
+    def solid_of(self, region: str) -> Solid:
+        """Return the solid of a region; raise InputError if there is no region of that name."""
+        cells = self.mesh.region(region)
+        return next(solid for solid in self.solids if np.array_equal(solid.index, cells))
+
+    def families_in(self, solid: Solid) -> list[SpreadFibres]:
+        """Return the fibre families that run through a solid."""
+        return [family for family in self.families if family.solid is solid]
+
+    def cauchy_stress(self, solid: Solid, state: State) -> Floats:
+        """Return the Cauchy stress of a solid with its fibre families at its quadrature points, ``(m, q, 6)``, MPa.
+
+        In the stored symmetric order, from the displacement. Fibres and membranes, which have no volume, have forces
+        of their own and are no part of it.
+        """
+        stress = solid.cauchy_stress(state)
+        for family in self.families_in(solid):
+            stress += family.cauchy_stress(state)
+        return stress
+
     def element_pressure(self, state: State) -> Floats:
-        """Return the mean of U'(θ) over every element, ``(n_cells,)``, MPa: its mean stress, positive in tension."""
+        """Return the mean of tr σ / 3 by volume at rest over every element, ``(n_cells,)``, MPa, positive in tension.
+
+        Without fibre families it is the mean of U'(θ).
+        """
         pressure = np.empty(self.mesh.n_cells)
-        for solid, values in zip(self.solids, state.lagged, strict=False):
-            pressure[solid.index] = solid.mean_pressure(state, values)
+        for solid in self.solids:
+            mean_stress = self.cauchy_stress(solid, state)[:, :, :3].mean(axis=2)
+            pressure[solid.index] = np.einsum("mq,mq->m", mean_stress, solid.dV) / solid.volume
         return pressure
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
@@ -408,9 +432,7 @@ class System:
         return cavity
 
     def _family(self, family: FibreFamily) -> SpreadFibres:
-        cells = self.mesh.region(family.region)
-        solid = next(solid for solid in self.solids if np.array_equal(solid.index, cells))
-        return SpreadFibres(self.mesh, solid, family)
+        return SpreadFibres(self.mesh, self.solid_of(family.region), family)
 
     def _dead_load(self, load: Dead, channel: int) -> DeadLoad:
         nodal = self._rest

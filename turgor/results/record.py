@@ -33,7 +33,7 @@ class StepRecord:
     displacement
         Shape ``(n, d)``, mm.
     element_pressure
-        Mean pressure of each element, shape ``(m,)``, MPa.
+        Mean stress of each element, fibre families included, shape ``(m,)``, MPa, positive in tension.
     element_dilatation
         Current volume over reference volume of each element, shape ``(m,)``.
     von_mises
