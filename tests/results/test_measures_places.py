@@ -96,6 +96,16 @@ def test_stress_over_a_surface_is_weighted_by_area() -> None:
     assert one(radial, "von_mises", region="body")["von_mises_body_mean_MPa"] == pytest.approx(2.0 / 3.0)
 
 
+def test_the_percentile_does_not_exceed_the_largest_stress() -> None:
+    # With 0 at the corners and 1 at the middles of the edges, the quadratic shape functions give 4/3 in a triangle.
+    stress = np.ones(FINGER.mesh.n_points)
+    stress[FINGER.mesh.cells[:, :4]] = 0.0
+    state = moved(FINGER, np.zeros_like(FINGER.mesh.points), von_mises=stress)
+    for chosen, key in (({"surface": "outer"}, "outer_"), ({"region": "body"}, "body_"), ({}, "")):
+        found = one(state, "von_mises", **chosen)
+        assert 1.0 < found[f"von_mises_{key}p99_MPa"] <= found[f"von_mises_{key}max_MPa"] <= 4.0 / 3.0
+
+
 def test_the_force_on_a_rigid_body_is_its_size() -> None:
     body = Body(FINGER.mesh, rigid_bodies=("table", "wall"))
     standing = {"contact": {"table": {"force_N": [0.0, 3.0, -4.0]}, "wall": {"force_N": [1.0, 0.0, 0.0]}}}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.solid import Solid
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.mesh.cells import Cell
@@ -21,15 +23,19 @@ class VonMises:
 
     Attributes
     ----------
+    by_region
+        At the nodes of each region, in the order of :meth:`turgor.mesh.mesh.Mesh.region_nodes`: extrapolated within
+        each element from its quadrature points, then averaged over the elements of the region that meet at the node,
+        weighted by their volume. Across an interface the stress jumps, so no mean is taken over both sides.
     nodal
-        ``(n_points,)``: extrapolated within each element from its quadrature points, then averaged over the elements
-        that meet at the node, weighted by their volume.
+        ``(n_points,)``: the same, for pictures; where regions meet, that of the region in which it is larger.
     largest
         Over the quadrature points: at a sharp corner it grows without bound as the mesh is refined.
     percentile_99
         Exceeded in one per cent of the volume only.
     """
 
+    by_region: Mapping[str, Floats]
     nodal: Floats
     largest: float
     percentile_99: float
@@ -37,21 +43,29 @@ class VonMises:
 
 def von_mises(system: System, state: State) -> VonMises:
     """Return the von Mises stress of a state."""
-    nodal = np.zeros(system.mesh.n_points)
-    weight = np.zeros(system.mesh.n_points)
+    mesh = system.mesh
+    by_region: dict[str, Floats] = {}
+    nodal = np.zeros(mesh.n_points)
     points, volumes = [], []
-    cell = system.mesh.cell
-    extrapolate = extrapolation(cell, cell.nodes)
-    for solid in system.solids:
+    for name in mesh.regions:
+        solid, nodes = system.solid_of(name), mesh.region_nodes(name)
         at_points = _von_mises(system.cauchy_stress(solid, state))
-        at_nodes = np.maximum(at_points @ extrapolate.T, 0.0)
-        share = np.repeat(solid.volume[:, None], solid.nodes.shape[1], axis=1)
-        nodal += np.bincount(solid.nodes.ravel(), (share * at_nodes).ravel(), minlength=len(nodal))
-        weight += np.bincount(solid.nodes.ravel(), share.ravel(), minlength=len(nodal))
+        by_region[name] = _smoothed(solid, at_points, mesh.n_points)[nodes]
+        nodal[nodes] = np.maximum(nodal[nodes], by_region[name])
         points.append(at_points.ravel())
         volumes.append(solid.dV.ravel())
     values = np.concatenate(points)
-    return VonMises(nodal / weight, float(values.max()), weighted_percentile(values, np.concatenate(volumes), 0.99))
+    percentile = weighted_percentile(values, np.concatenate(volumes), 0.99)
+    return VonMises(by_region, nodal, float(values.max()), percentile)
+
+
+def _smoothed(solid: Solid, at_points: Floats, n_points: int) -> Floats:
+    """Return the nodal field ``(n_points,)`` of positive values ``(m, q)`` of a solid, zero where it has no nodes."""
+    at_nodes = np.maximum(at_points @ extrapolation(solid.cell, solid.cell.nodes).T, 0.0)
+    places, share = solid.nodes.ravel(), np.broadcast_to(solid.volume[:, None], solid.nodes.shape)
+    total = np.bincount(places, (share * at_nodes).ravel(), minlength=n_points)
+    weight = np.bincount(places, share.ravel(), minlength=n_points)
+    return total / np.where(weight > 0.0, weight, 1.0)
 
 
 def _von_mises(stress: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -123,6 +124,10 @@ class Mesh:
         """Return the cell indices of a region; raise InputError if there is none of that name."""
         return _named(self.regions, name, "region")
 
+    def region_nodes(self, name: str) -> IntArray:
+        """Return the nodes of a region's cells, each once, in ascending order; raise InputError for an unknown name."""
+        return _named(self._region_nodes, name, "region")
+
     def surface(self, name: str) -> IntArray:
         """Return the faces ``(k, nodes_per_face)`` of a surface; raise InputError if there is none of that name."""
         return _named(self.surfaces, name, "surface")
@@ -176,6 +181,10 @@ class Mesh:
         faces = self.surface(surface)
         field = volume_field(self.points, faces, surface, caps=self.caps)
         return field.enclosed(self.points if displacement is None else self.points + displacement, faces)
+
+    @cached_property
+    def _region_nodes(self) -> dict[str, IntArray]:
+        return {name: np.unique(self.cells[cells]) for name, cells in self.regions.items()}
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)

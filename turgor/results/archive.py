@@ -26,6 +26,7 @@ Curves = dict[str, list[Row]]
 """The curves of a state: title → rows."""
 
 _Content = TypeVar("_Content")
+_OF_REGION = "von_mises_by_region"
 _NAMED = ("regions", "surfaces", "markers", "curves", "caps")
 
 
@@ -59,6 +60,8 @@ def save_record(path: Path, record: StepRecord, row: Row, curves: Curves) -> Non
     arrays = {name: np.asarray(getattr(record, name), dtype=np.float64) for name in ARRAY_FIELDS}
     if record.mode is not None:
         arrays["mode"] = np.asarray(record.mode, dtype=np.float64)
+    for region, values in record.von_mises_by_region.items():
+        arrays[f"{_OF_REGION}/{region}"] = np.asarray(values, dtype=np.float64)
     _save(path, {**arrays, "plain": _as_json(plain), "row": _as_json(row), "curves": _as_json(curves)})
 
 
@@ -68,6 +71,8 @@ def load_record(path: Path) -> StepRecord:
     def build(archive: Mapping[str, npt.NDArray[Any]]) -> StepRecord:
         arrays: dict[str, Any] = {name: archive[name] for name in ARRAY_FIELDS}
         arrays["mode"] = archive.get("mode")
+        prefix = f"{_OF_REGION}/"
+        arrays[_OF_REGION] = {key.removeprefix(prefix): archive[key] for key in archive if key.startswith(prefix)}
         return StepRecord(**_from_json(archive["plain"]), **arrays)
 
     return _load(path, build)

@@ -37,7 +37,7 @@ class StepRecord:
     element_dilatation
         Current volume over reference volume of each element, shape ``(m,)``.
     von_mises
-        Nodal von Mises stress of the Cauchy stress, shape ``(n,)``, MPa.
+        Nodal von Mises stress of the Cauchy stress, shape ``(n,)``, MPa; where regions meet, the larger one.
     von_mises_max, von_mises_p99
         Largest value over the quadrature points and 99th percentile by volume, MPa.
     cavity_volumes
@@ -51,6 +51,9 @@ class StepRecord:
         what the body has.
     mode
         Eigenmode in which the body gives way in this state, ``(n, 3)``, largest component one, where it does.
+    von_mises_by_region
+        Where the body has several regions, the nodal von Mises stress of each alone, at its
+        :meth:`turgor.mesh.mesh.Mesh.region_nodes`, MPa; empty for one region, and in runs that were stored without.
     """
 
     index: int
@@ -66,6 +69,7 @@ class StepRecord:
     solver: Mapping[str, Any]
     standing: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
     mode: FloatArray | None = None
+    von_mises_by_region: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def check(self, mesh: Mesh) -> None:
         """Raise InputError unless the arrays have the shapes that `mesh` asks for."""
@@ -77,14 +81,21 @@ class StepRecord:
             "von_mises": (n,),
         }
         for name, shape in shapes.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise InputError("the array does not fit the mesh", key=name, value=found, expected=f"shape {shape}")
+            _check_shape(name, getattr(self, name), shape)
+        for region, values in self.von_mises_by_region.items():
+            _check_shape(f"von_mises_by_region.{region}", values, mesh.region_nodes(region).shape)
         missing = [name for name in SOLVER_FACTS if name not in self.solver]
         if missing:
             raise InputError(f"the solver's facts lack {', '.join(missing)}", key="solver")
 
 
 ARRAY_FIELDS = ("displacement", "element_pressure", "element_dilatation", "von_mises")
-PLAIN_FIELDS = tuple(entry.name for entry in fields(StepRecord) if entry.name not in (*ARRAY_FIELDS, "mode"))
+_OWN_ARRAYS = (*ARRAY_FIELDS, "mode", "von_mises_by_region")
+PLAIN_FIELDS = tuple(entry.name for entry in fields(StepRecord) if entry.name not in _OWN_ARRAYS)
 """The fields of a record that JSON can hold; the others are arrays."""
+
+
+def _check_shape(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
+    found = np.shape(array)
+    if found != shape:
+        raise InputError("the array does not fit the mesh", key=name, value=found, expected=f"shape {shape}")

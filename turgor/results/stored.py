@@ -69,6 +69,7 @@ class Body:
     def at_rest(self) -> StoredState:
         """Return the state in which nothing has moved yet."""
         n, m = self.mesh.n_points, self.mesh.n_cells
+        regions = self.mesh.regions if len(self.mesh.regions) > 1 else ()
         record = StepRecord(
             index=0,
             fraction=0.0,
@@ -81,6 +82,7 @@ class Body:
             von_mises_p99=0.0,
             cavity_volumes={},
             solver={},
+            von_mises_by_region={name: np.zeros(len(self.mesh.region_nodes(name))) for name in regions},
         )
         return StoredState(self, record)
 
@@ -101,6 +103,18 @@ class StoredState:
     def displacement(self) -> FloatArray:
         """Displacement of the nodes, ``(n, d)``, mm."""
         return self.record.displacement
+
+    def von_mises_in(self, region: str) -> FloatArray:
+        """Return the nodal von Mises stress of a region alone, ``(n,)``, MPa; NaN at other nodes.
+
+        Also at its own in a state of several regions that was stored without that of each.
+        """
+        if len(self.mesh.regions) == 1:
+            return self.record.von_mises
+        field = np.full(self.mesh.n_points, np.nan)
+        if region in self.record.von_mises_by_region:
+            field[self.mesh.region_nodes(region)] = self.record.von_mises_by_region[region]
+        return field
 
     @property
     def positions(self) -> FloatArray:

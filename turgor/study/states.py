@@ -60,6 +60,7 @@ def to_record(
         element_pressure=system.element_pressure(state),
         element_dilatation=system.dilatation(state),
         von_mises=stress.nodal,
+        von_mises_by_region=stress.by_region if len(stress.by_region) > 1 else {},
         von_mises_max=stress.largest,
         von_mises_p99=stress.percentile_99,
         cavity_volumes={cavity.name: cavity.volume(state.u) for cavity in system.cavities},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,10 +12,12 @@ from turgor.fem.fields import weighted_percentile
 from turgor.fem.interface import interface_name
 from turgor.fem.section import depth, surface_areas
 from turgor.mesh.cells import determinants, face_cell, jacobians
+from turgor.mesh.mesh import Mesh
 from turgor.results.measures.registry import measure
-from turgor.results.stored import Body, StoredState
+from turgor.results.stored import StoredState
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
 
 
 @measure(
@@ -25,20 +29,21 @@ def von_mises(state: StoredState, *, surface: str | None = None, region: str | N
     """Von Mises stress in MPa over a surface (by area), a region or the whole body (by volume): largest, p99, mean.
 
     At a sharp corner the largest value grows without bound as the mesh is refined; the 99th percentile, exceeded on one
-    per cent of the area or volume only, and the mean do not. Areas and volumes are those at rest; the nodal stress of
-    the state is interpolated between the nodes.
+    per cent of the area or volume only, and the mean do not. Areas and volumes are those at rest. The stress is that of
+    each region alone, on a surface of the region whose cells the faces belong to, interpolated between the nodes; the
+    largest is over nodes and quadrature points. NaN for several regions in a run that was stored without that of each.
     """
     if surface is not None and region is not None:
         raise InputError("a surface and a region are given", key="region", expected="only one of the two")
-    faces = state.body.mesh.surface(surface) if surface is not None else None
-    values, weights = (
-        _over_region(state.body, state.record.von_mises, region)
-        if faces is None
-        else _over_surface(state.body, state.record.von_mises, faces)
-    )
-    mean = float(values @ weights / weights.sum())
-    nodes = np.unique(faces) if faces is not None else np.unique(_cells(state.body, region))
-    return np.array([state.record.von_mises[nodes].max(), weighted_percentile(values, weights, 0.99), mean])
+    if surface is not None:
+        parts = [_on_faces(state, name, faces) for name, faces in _faces_by_region(state.mesh, surface)]
+    else:
+        parts = [_in_region(state, name) for name in (state.mesh.regions if region is None else (region,))]
+    at_nodes, values, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if np.isnan(at_nodes).any():
+        return np.full(3, np.nan)
+    largest, mean = max(at_nodes.max(), values.max()), values @ weights / weights.sum()
+    return np.array([largest, weighted_percentile(values, weights, 0.99), mean])
 
 
 @measure(
@@ -66,21 +71,29 @@ def interface_stress(state: StoredState, *, first: str, second: str) -> FloatArr
 _INTERFACE = ("traction_max_MPa", "traction_p99_MPa", "traction_mean_MPa", "normal_max_MPa", "shear_max_MPa")
 
 
-def _over_surface(body: Body, nodal: FloatArray, faces: npt.NDArray[np.int32]) -> tuple[FloatArray, FloatArray]:
-    """Return values and areas at the quadrature points of faces, each flat."""
-    _, areas = surface_areas(body.mesh.points, faces, body.mechanics)
-    values = nodal[faces] @ face_cell(faces).shape_at_quadrature.T
-    return values.ravel(), areas.ravel()
+def _on_faces(state: StoredState, region: str, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a region's stress at the nodes of its faces and at their quadrature points, and the areas, each flat."""
+    _, areas = surface_areas(state.mesh.points, faces, state.body.mechanics)
+    at_nodes = state.von_mises_in(region)[faces]
+    return at_nodes.ravel(), (at_nodes @ face_cell(faces).shape_at_quadrature.T).ravel(), areas.ravel()
 
 
-def _over_region(body: Body, nodal: FloatArray, region: str | None) -> tuple[FloatArray, FloatArray]:
-    """Return values and volumes at the quadrature points of cells, each flat."""
-    cells, kind = _cells(body, region), body.mesh.cell
-    nodes = body.mesh.points[cells]
+def _in_region(state: StoredState, region: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a region's stress at the nodes of its cells and at their quadrature points, and the volumes, each flat."""
+    cells, kind = state.mesh.cells[state.mesh.region(region)], state.mesh.cell
+    nodes = state.mesh.points[cells]
     places = np.einsum("qa,mai->mqi", kind.shape_at_quadrature, nodes)
-    volumes = determinants(jacobians(nodes, kind)) * kind.weights * depth(body.mechanics, places)
-    return (nodal[cells] @ kind.shape_at_quadrature.T).ravel(), volumes.ravel()
+    volumes = determinants(jacobians(nodes, kind)) * kind.weights * depth(state.body.mechanics, places)
+    at_nodes = state.von_mises_in(region)[cells]
+    return at_nodes.ravel(), (at_nodes @ kind.shape_at_quadrature.T).ravel(), volumes.ravel()
 
 
-def _cells(body: Body, region: str | None) -> npt.NDArray[np.int32]:
-    return body.mesh.cells if region is None else body.mesh.cells[body.mesh.region(region)]
+@lru_cache(maxsize=8)
+def _faces_by_region(mesh: Mesh, surface: str) -> list[tuple[str, IntArray]]:
+    """Return the faces of a surface that belong to cells of each region, where there are any."""
+    faces = mesh.surface(surface)
+    if len(mesh.regions) == 1:
+        return [(name, faces) for name in mesh.regions]
+    hosts = mesh.surface_hosts(surface)
+    parts = ((name, faces[np.isin(hosts, cells)]) for name, cells in mesh.regions.items())
+    return [(name, part) for name, part in parts if len(part)]
