@@ -8,7 +8,8 @@ import scipy.sparse as sp
 from samples import check_assembled, neo_hookean, random_state, shifted
 
 from turgor.common.errors import InputError
-from turgor.fem.loads import Gravity, Pressure, Traction
+from turgor.fem.loading import Loading
+from turgor.fem.loads import Force, Gravity, Pressure, Traction
 from turgor.fem.pattern import SparsePattern
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.system import System
@@ -151,6 +152,25 @@ def test_materials_must_match_the_regions():
         System(mesh, {}, PLANES)
     with pytest.raises(InputError, match="skin"):
         System(mesh, {"body": neo_hookean(), "skin": neo_hookean()}, PLANES)
+
+
+def test_each_load_has_a_name_of_its_own():
+    forces = [Force("z1", tuple(axis)) for axis in np.eye(3)]
+    loading = Loading([*forces[:2], Traction("z1", (0.0, 0.0, 0.1)), Force("z0", (1.0, 0.0, 0.0)), forces[2]])
+    assert loading.names == ("force:z1", "force:z1#2", "traction:z1", "force:z0", "force:z1#3")
+
+
+def test_the_solid_of_a_region_is_found_whatever_the_order_of_the_materials():
+    mesh = box((1.0, 1.0, 2.0), (1, 1, 2))
+    above = mesh.points[mesh.cells].mean(axis=1)[:, 2] > 1.0
+    regions = {"low": np.flatnonzero(~above), "high": np.flatnonzero(above)}
+    mesh = Mesh(mesh.points, mesh.cells, regions, mesh.surfaces)
+    system = System(mesh, {"high": neo_hookean(2.0), "low": neo_hookean(1.0)}, [Clamped("z0")])
+    for name, modulus in (("low", 1.0), ("high", 2.0)):
+        assert np.array_equal(system.solid_of(name).index, regions[name])
+        assert system.solid_of(name).material.shear_modulus == modulus
+    with pytest.raises(InputError, match="region"):
+        system.solid_of("middle")
 
 
 def test_a_block_that_holds_a_node_twice_adds_both_its_places():

@@ -77,19 +77,24 @@ def _programme(load: Load | RigidContact) -> tuple[float, Programme]:
 
 
 def _names(loads: Sequence[Load | RigidContact]) -> tuple[str, ...]:
+    kinds = [_kind(load) for load in loads]
     names: list[str] = []
-    for load in loads:
-        if isinstance(load, Pressure):
-            name = PRESSURE_PREFIX + load.cavity
-        elif isinstance(load, Gravity):
-            name = "gravity"
-        elif isinstance(load, RigidContact):
-            name = f"motion:{load.name}"
-        else:
-            name = f"{type(load).__name__.lower()}:{load.surface}"
-        if name in names and isinstance(load, Pressure):
+    for number, (load, kind) in enumerate(zip(loads, kinds, strict=True)):
+        earlier = kinds[:number].count(kind)
+        if earlier and isinstance(load, Pressure):
             raise InputError(
                 "the cavity is given two pressures", key="loads", value=load.cavity, expected="one for each cavity"
             )
-        names.append(name if name not in names else f"{name}#{names.count(name) + 1}")
+        names.append(f"{kind}#{earlier + 1}" if earlier else kind)
     return tuple(names)
+
+
+def _kind(load: Load | RigidContact) -> str:
+    """Return what a load is called where it is the only one of its kind there."""
+    if isinstance(load, Pressure):
+        return PRESSURE_PREFIX + load.cavity
+    if isinstance(load, Gravity):
+        return "gravity"
+    if isinstance(load, RigidContact):
+        return f"motion:{load.name}"
+    return f"{type(load).__name__.lower()}:{load.surface}"
