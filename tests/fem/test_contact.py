@@ -11,10 +11,12 @@ from contact_checks import check_contact, check_obstacle
 from samples import check_assembled, neo_hookean, random_state
 
 from turgor.common.errors import InputError
+from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.partners import balls, find_partners
 from turgor.fem.contact.shapes import second_derivatives, shape_functions
 from turgor.fem.contact.skin import Skin
-from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact
+from turgor.fem.contact.spec import PairContact, RigidContact, SelfContact, Spring
+from turgor.fem.loads import Traction
 from turgor.fem.rigid import Box, Cylinder, Plane, Sphere
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
@@ -81,6 +83,28 @@ def test_rigid_body(name, kind):
     system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z1")], contact=[case])
     state = random_state(system, 0.008)
     check_obstacle(system.contacts[0], state, case.motion)
+
+
+def test_two_bodies_are_two_also_where_they_are_equal_or_made_of_arrays():
+    mesh = box((2.0, 2.0, 2.0), (1, 1, 1))
+    plane = Plane(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, -1.0]))
+    led = RigidContact(plane, motion=np.array([0.0, 0.0, -0.1]), label="led")
+    sprung = RigidContact(plane, label="sprung", spring=Spring(0.5, np.array([0.0, 0.0, 1.0])))
+    barred = replace(led, label="barred", method="barrier", body=Plane(np.array([0.0, 0.0, 3.0]), plane.normal))
+    contact = [led, SelfContact(), replace(led), led, sprung, replace(sprung), barred]
+    loads = [Traction("z1", (0.0, 0.0, 0.1))]
+    system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("z0")], loads, contact=contact)
+    assert system.loading.names == ("traction:z1", "motion:led", "motion:led#2", "motion:led#3")
+    bodies = [term for term in system.contacts if isinstance(term, Obstacle)]
+    pushed = []
+    for load in range(1, 4):
+        state = system.consistent(system.reference_state().u, np.eye(4)[load])
+        pushed.append([body.energy(state) > 0.0 for body in bodies])
+    for row in range(2):
+        u = system.reference_state().u
+        u[mesh.n_points + row, 2] = -0.1
+        pushed.append([body.energy(system.consistent(u, np.zeros(4))) > 0.0 for body in bodies])
+    assert np.array_equal(pushed, np.eye(5, dtype=bool))
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -103,8 +104,7 @@ class System:
         self.fibres = [EmbeddedFibre(mesh, part) for part in reinforcements if isinstance(part, Fibre)]
         self.bending = [FibreBending(mesh, embedded) for embedded in self.fibres if embedded.resists_bending]
         self.membranes = [BondedMembrane(mesh, part) for part in reinforcements if isinstance(part, Membrane)]
-        self.contacts: list[Contact] = [self._contact(materials, case, number) for number, case in enumerate(contact)]
-        self.contacts += mirrors(mesh, materials, contact, self._largest_pressure, section)
+        self.contacts = self._contacts(materials, contact, itertools.count(len(loads)))
         self.families = [self._family(part) for part in reinforcements if isinstance(part, FibreFamily)]
         embedded: tuple[Term, ...] = (*self.fibres, *self.bending, *self.membranes, *self.families)
         self.terms: tuple[Term, ...] = (
@@ -404,22 +404,24 @@ class System:
         BlockFrames(self.constraints, [nodes]).turn(0, packed)
         return nodes, packed
 
-    def _contact(self, materials: Mapping[str, Hyperelastic], case: ContactCase, number: int) -> Contact:
-        channel = self.loading.loads.index(case) if isinstance(case, RigidContact) and case.is_load else None
-        pressure = self._largest_pressure
-        return make_contact(self.mesh, materials, case, pressure, channel, self.section, number, self._row(case))
-
-    @property
-    def _largest_pressure(self) -> float:
-        return max((abs(load.value) for load in self.loading.loads if isinstance(load, Pressure)), default=0.0)
+    def _contacts(
+        self, materials: Mapping[str, Hyperelastic], cases: Sequence[ContactCase], channels: Iterator[int]
+    ) -> list[Contact]:
+        """Return the terms of what may touch; `channels` are the places in ``State.loads`` left for motions."""
+        pressure = max((abs(load.value) for load in self.loading.loads if isinstance(load, Pressure)), default=0.0)
+        # Counted, not looked up: two bodies may be equal, and arrays do not say whether they are.
+        rows = itertools.count(self.mesh.n_points)
+        found: list[Contact] = []
+        for number, case in enumerate(cases):
+            channel = next(channels) if isinstance(case, RigidContact) and case.is_load else None
+            row = next(rows) if isinstance(case, RigidContact) and case.is_unknown else None
+            found.append(make_contact(self.mesh, materials, case, pressure, channel, self.section, number, row))
+        return [*found, *mirrors(self.mesh, materials, cases, pressure, self.section)]
 
     @property
     def _rest(self) -> Floats:
         """No displacement, ``(n_points + n_bodies, d)``: a row for each node, then one for each unknown body."""
         return np.zeros_like(self.constraints.value)
-
-    def _row(self, case: ContactCase) -> int | None:
-        return self.mesh.n_points + self._unknown_bodies.index(case) if case in self._unknown_bodies else None
 
     def _springs(self) -> list[BodySpring]:
         rows = enumerate(self._unknown_bodies, self.mesh.n_points)

@@ -248,7 +248,7 @@ def _check(case: ContactCase) -> None:
             value=case.friction,
             expected="0, or method: penalty",
         )
-    if case.method == "barrier" and isinstance(case, RigidContact) and case.motion and case.spring:
+    if case.method == "barrier" and isinstance(case, RigidContact) and case.motion is not None and case.spring:
         raise InputError(
             "by the barrier a spring has no far end that moves",
             key=f"contact.{case.name}",
