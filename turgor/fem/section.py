@@ -26,7 +26,11 @@ class PlaneStrain:
 
 @dataclass(frozen=True)
 class PlaneStress:
-    """A thin sheet whose faces are free, so that it changes its `thickness`, mm, given in the reference state."""
+    """A thin sheet whose faces are free, so that it changes its `thickness`, mm, given in the reference state.
+
+    The air in a cavity acts on the thickness at rest: normal to the edge the Cauchy stress is −p/λ₃ there, λ₃ the
+    stretch across the sheet.
+    """
 
     thickness: float = 1.0
 
