@@ -113,6 +113,16 @@ def test_wrong_documents(document):
         define_model(document)
 
 
+@pytest.mark.parametrize(
+    "name", ["density", "volumetric", "program", "name", "parameters", "shear_modulus", "exp", "I1", "lambda", "a-b", 3]
+)
+def test_constants_do_not_take_names_that_have_a_meaning(name):
+    document = {"name": "x", "energy": "mu*(I1-3)", "constants": {"mu": {"unit": "MPa"}, name: {"unit": "MPa"}}}
+    with pytest.raises(InputError, match="cannot be the name of a constant") as found:
+        define_model(document)
+    assert found.value.key == f"constants.{name}"
+
+
 def test_wrong_files_are_named(tmp_path):
     file = tmp_path / "model.yaml"
     with pytest.raises(InputError, match=r"model\.yaml"):

@@ -19,6 +19,7 @@ import ast
 import dataclasses
 import functools
 import itertools
+import keyword
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -123,6 +124,10 @@ class StretchExpression(StretchModel):
         return W, np.stack(rest[:3], axis=-1), curvature
 
 
+_TAKEN = frozenset((*INVARIANTS, *STRETCHES, *FUNCTIONS, "program", *dir(InvariantExpression), *dir(StretchExpression)))
+"""What a constant may not be called: a variable, a function, or what every material has, such as its density."""
+
+
 def load_model(path: str | Path) -> type[Hyperelastic]:
     """Return the model that a file describes.
 
@@ -175,8 +180,9 @@ def _fields(constants: object) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for key, description in constants.items():
         place = f"constants.{key}"
-        if not isinstance(key, str) or not _SYMBOL.fullmatch(key) or key in (*INVARIANTS, *STRETCHES, *FUNCTIONS):
-            raise InputError("this cannot be the name of a constant", key=place, expected="letters and digits")
+        if not isinstance(key, str) or not _SYMBOL.fullmatch(key) or key in _TAKEN or keyword.iskeyword(key):
+            expected = "letters and digits that have no meaning of their own yet"
+            raise InputError("this cannot be the name of a constant", key=place, value=key, expected=expected)
         if not isinstance(description, dict) or description.keys() - {"unit", "start", "bounds"}:
             raise InputError("wrong description", key=place, expected="{unit: MPa} or {start: [1, 3], bounds: [0, 9]}")
         if "unit" in description:
