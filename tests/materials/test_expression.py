@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
-from turgor.materials import create, find_model
+from turgor.materials import create, expression, find_model
 from turgor.materials.expression import define_model
 from turgor.materials.fit import fit
 from turgor.materials.measurement import MaterialTest
@@ -36,6 +36,32 @@ def test_known_models_come_out_the_same():
     written, built = ogden(mu=0.1, alpha=3.3), create("ogden-1", {"mu1": 0.1, "alpha1": 3.3})
     np.testing.assert_allclose(written.tangent(F), built.tangent(F), rtol=1e-11, atol=1e-11)
     assert written.shear_modulus == pytest.approx(0.1)
+
+
+MODULI = {"mu": {"unit": "MPa"}, "c": {"unit": "MPa"}}
+
+
+def test_the_root_of_a_square_is_a_magnitude():
+    """√((I₁ − 3)²) is I₁ − 3; at 5 there is a kink, and the stress of the part behind it has the opposite sign."""
+    written = model("mu*sqrt((I1-3)**2)/2", mu={"unit": "MPa"})(mu=0.1)
+    bent = model("mu*(I1-3)/2 + c*sqrt((I1-5)**2)", **MODULI)(mu=0.1, c=0.02)
+    smooth = model("mu*(I1-3) + c*((I1-5)**2)**1.5", **MODULI)(mu=0.3, c=0.001)
+    built = create("neo-hookean", {"C10": 0.05})
+    F = np.stack([np.eye(3), np.diag([1.5, 0.8, 0.9]), np.diag([2.8, 0.6, 0.6])])
+    np.testing.assert_allclose(written.tangent(F), built.tangent(F), rtol=1e-12, atol=1e-12)
+    assert written.shear_modulus == pytest.approx(0.1)
+    x = np.array([1.4, 2.5])  # I1 is 3.4 and 7.1
+    share = np.array([0.05 - 0.02, 0.05 + 0.02])
+    np.testing.assert_allclose(bent.uniaxial(x), 2.0 * share * (x - x**-2), rtol=1e-12)
+    share = 0.3 + 0.003 * (lambda y: y * np.abs(y))(x**2 + 2.0 / x - 5.0)
+    np.testing.assert_allclose(smooth.uniaxial(x), 2.0 * share * (x - x**-2), rtol=1e-12)
+    assert np.all(np.isfinite(bent.tangent(F)))
+
+
+def test_functions_that_cannot_be_evaluated_are_refused_by_name(monkeypatch):
+    monkeypatch.delitem(expression._EVALUATED, "DiracDelta")
+    with pytest.raises(InputError, match=r"energy: .* hold DiracDelta"):
+        model("mu*sqrt((I1-5)**2)")
 
 
 def test_a_file_is_a_model_wherever_a_name_is():
@@ -80,6 +106,8 @@ def test_fit_recovers_a_user_model(name):
         "",
         "mu*I1" + "+mu*I1" * 400,
         "mu*(I1/0)",
+        "mu*(I1-3)*sqrt(-2)",
+        "mu*(I1-3)*log(0)",
         "I1 - 3",
         "mu**2*(I1-3)",
         "mu*(I1-3) + 1",
@@ -105,6 +133,7 @@ def test_anything_else_is_refused(energy):
         {"name": "x", "energy": "mu*I1**n", "constants": {"mu": {"unit": "MPa"}, "n": {"start": ["a"]}}},
         {"name": "x", "energy": "mu*I1**n", "constants": {"mu": {"unit": "MPa"}, "n": {"start": 5, "bounds": [0, 1]}}},
         {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa"}, "k": {"unit": "MPa"}}},
+        {"name": "x", "energy": "mu*I1+k-k", "constants": {"mu": {"unit": "MPa"}, "k": {"unit": "MPa"}}},
         {"name": "x", "energy": "mu*I1", "constants": {"mu": {"unit": "MPa"}}, "code": "import os"},
     ],
 )

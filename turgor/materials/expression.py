@@ -22,7 +22,7 @@ import itertools
 import keyword
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -38,7 +38,18 @@ from turgor.materials.kinematics import Array
 
 INVARIANTS = ("I1", "I2")
 STRETCHES = ("lambda1", "lambda2", "lambda3")
+EXCESSES = ("I1 - 3", "I2 - 3")
+"""What programs take in place of the invariants: never negative, which lets sympy simplify √((I1 − 3)²)."""
 FUNCTIONS = ("exp", "log", "sqrt", "sinh", "cosh", "tanh")
+
+_EVALUATED: dict[str, Callable[[Any], Any]] = {
+    **{name: getattr(np, name) for name in FUNCTIONS},
+    "Abs": np.abs,
+    "sign": np.sign,
+    # Of the jump of a sign: zero but at the kink itself, where the energy has no second derivative.
+    "DiracDelta": np.zeros_like,
+}
+"""Numpy's for the functions of sympy that an energy and its derivatives may hold: √(x²) becomes |x|."""
 
 _LONGEST = 2000
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -76,7 +87,7 @@ def _evaluate(expression: Any, known: Mapping[str, Any]) -> Any:
     if expression.is_Pow:
         exponent = expression.args[1]
         return arguments[0] ** int(exponent) if exponent.is_Integer and exponent > 0 else arguments[0] ** arguments[1]
-    return getattr(np, expression.func.__name__)(*arguments)
+    return _EVALUATED[expression.func.__name__](*arguments)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +105,8 @@ class InvariantExpression(InvariantModel):
     @override
     def derivatives(self, I1: Array, I2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
         # Round-off may bring an invariant below 3, where a root of I1 - 3 has no value.
-        variables: dict[str, Array | float] = {"I1": np.maximum(I1, 3.0), "I2": np.maximum(I2, 3.0)}
+        excesses = (np.maximum(invariant - 3.0, 0.0) for invariant in (I1, I2))
+        variables: dict[str, Array | float] = dict(zip(EXCESSES, excesses, strict=True))
         variables.update(self.parameters)
         W, W1, W2, W11, W12, W22 = self.program(variables)
         return W, W1, W2, W11, W12, W22
@@ -223,12 +235,13 @@ def _parse(text: object, constants: set[str]) -> tuple[Any, tuple[str, ...]]:
     basis = INVARIANTS if names & set(INVARIANTS) else STRETCHES
     if not names & set(basis):
         raise InputError("the energy does not depend on the deformation", key="energy", value=text, expected=expected)
-    if unused := constants - names:
-        raise InputError("a constant does not occur in the energy", key="constants", value=", ".join(sorted(unused)))
     try:
-        return _translate(tree.body), basis
+        energy = _translate(tree.body)
     except RecursionError as error:
         raise InputError("this expression is nested too deeply", key="energy") from error
+    if unused := constants - {str(symbol) for symbol in energy.free_symbols}:
+        raise InputError("a constant does not occur in the energy", key="constants", value=", ".join(sorted(unused)))
+    return energy, basis
 
 
 def _translate(node: ast.AST) -> Any:
@@ -274,8 +287,25 @@ def _translate(node: ast.AST) -> Any:
 
 def _differentiate(energy: Any, basis: tuple[str, ...], moduli: Sequence[str]) -> tuple[Program, type[Hyperelastic]]:
     sympy = require("sympy", "a model from a strain-energy expression")
-    symbols = {str(symbol): symbol for symbol in energy.free_symbols}
-    linear = [symbols[name] for name in moduli]
+    _check_linear(energy, moduli)
+    x = [sympy.Symbol(name, positive=True) for name in basis]
+    W = energy
+    if basis == INVARIANTS:
+        excesses = [sympy.Symbol(name, nonnegative=True) for name in EXCESSES]
+        W, x = energy.subs({invariant: 3 + y for invariant, y in zip(x, excesses, strict=True)}), excesses
+    at_rest = W.subs(dict.fromkeys(x, 0 if basis == INVARIANTS else 1))
+    first = [sympy.diff(W, variable) for variable in x]
+    pairs = itertools.combinations_with_replacement(range(len(x)), 2)
+    second = [sympy.diff(first[i], x[j]) for i, j in pairs]
+    expressions = [W - at_rest, *first, *second]
+    _check_evaluated(expressions, energy)
+    return Program(expressions), InvariantExpression if basis == INVARIANTS else StretchExpression
+
+
+def _check_linear(energy: Any, moduli: Sequence[str]) -> None:
+    """Refuse an energy that is not linear in its moduli."""
+    sympy = require("sympy", "a model from a strain-energy expression")
+    linear = [symbol for symbol in energy.free_symbols if str(symbol) in moduli]
     at_zero = energy.subs(dict.fromkeys(linear, 0))
     bent = any(sympy.simplify(sympy.diff(energy, a, b)) != 0 for a in linear for b in linear)
     if not linear or bent or sympy.simplify(at_zero) != 0:
@@ -285,13 +315,18 @@ def _differentiate(energy: Any, basis: tuple[str, ...], moduli: Sequence[str]) -
             value=str(energy),
             expected="every term with one factor in MPa, and only one",
         )
-    x = [symbols.get(name, sympy.Symbol(name, positive=True)) for name in basis]
-    at_rest = energy.subs(dict.fromkeys(x, 3 if basis == INVARIANTS else 1))
-    first = [sympy.diff(energy, variable) for variable in x]
-    pairs = itertools.combinations_with_replacement(range(len(x)), 2)
-    second = [sympy.diff(first[i], x[j]) for i, j in pairs]
-    program = Program([energy - at_rest, *first, *second])
-    return program, InvariantExpression if basis == INVARIANTS else StretchExpression
+
+
+def _check_evaluated(expressions: Sequence[Any], energy: Any) -> None:
+    """Refuse an energy if it or a derivative cannot be evaluated."""
+    sympy = require("sympy", "a model from a strain-energy expression")
+    if any(expression.has(sympy.I, sympy.zoo, sympy.oo, -sympy.oo, sympy.nan) for expression in expressions):
+        raise InputError("the energy has no real value", key="energy", value=str(energy), expected="finite real terms")
+    calls = set[Any]().union(*(expression.atoms(sympy.Function) for expression in expressions))
+    unknown = {call.func.__name__ for call in calls} - _EVALUATED.keys()
+    if unknown:
+        problem = f"the energy or its derivatives hold {', '.join(sorted(unknown))}, which cannot be evaluated"
+        raise InputError(problem, key="energy", value=str(energy), expected="an energy without it")
 
 
 def _check_symmetry(kind: type[Hyperelastic]) -> None:
