@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
+from turgor.fem.supports import Prescribed, Sliding
+from turgor.fem.system import System
 from turgor.materials import create, expression, find_model
 from turgor.materials.expression import define_model
 from turgor.materials.fit import fit
 from turgor.materials.measurement import MaterialTest
+from turgor.mesh.structured import box
+from turgor.solver.path import solve_path
 
 HERE = Path(__file__).parent
 
@@ -56,6 +60,56 @@ def test_the_root_of_a_square_is_a_magnitude():
     share = 0.3 + 0.003 * (lambda y: y * np.abs(y))(x**2 + 2.0 / x - 5.0)
     np.testing.assert_allclose(smooth.uniaxial(x), 2.0 * share * (x - x**-2), rtol=1e-12)
     assert np.all(np.isfinite(bent.tangent(F)))
+
+
+M = "(lambda_m**2 - 3)"
+ETA = f"sqrt((I1-3)/{M})"
+ROUGH = {
+    "power": ("mu/2*(I1-3) + c*(I1-3)**1.5", {}, {}),
+    "exponent": ("mu/2*(I1-3) + c*(I1-3)**a", {"a": {"start": [1.5]}}, {"a": 1.5}),
+    "other": ("mu/2*(I1-3) + c*(I2-3)**1.5 + 0*c", {}, {}),
+    "logarithm": ("mu/2*(I1-3) + c*(I1-3)**2*log(I1-3)", {}, {}),
+}
+"""Energies without a second derivative, or without a value, at rest."""
+
+
+@pytest.mark.parametrize("name", ROUGH)
+def test_energies_that_are_rough_at_rest(name):
+    energy, further, values = ROUGH[name]
+    material = create(model(energy, **MODULI, **further), {"mu": 0.1, "c": 0.02, **values}, bulk_modulus=2.0)
+    assert material.shear_modulus == pytest.approx(0.1, rel=1e-5)
+    assert float(material.energy(np.eye(3))) == pytest.approx(0.0, abs=1e-20)
+    assert np.abs(material.stress(np.eye(3))).max() < 1e-15
+    linear = create("neo-hookean", {"C10": 0.05}, bulk_modulus=2.0).tangent(np.eye(3))
+    np.testing.assert_allclose(material.tangent(np.eye(3)), linear, atol=1e-6)
+    # From rest on, through where the guard begins, the tangent is the slope of the stress.
+    direction = np.array([[0.3, 0.2, 0.0], [0.0, -0.5, 0.1], [0.4, 0.0, 0.2]])
+    sizes = np.array([0.0, 1e-9, 1e-8, 1e-6, 1e-4, 1e-2])[:, None, None]
+    tangent, step = material.tangent(np.eye(3) + sizes * direction), 1e-6 + 1e-3 * sizes
+    more, less = (material.stress(np.eye(3) + (sizes + side * step) * direction) for side in (1.0, -1.0))
+    slope = (more - less) / (2.0 * step)
+    np.testing.assert_allclose(np.einsum("nijkl,kl->nij", tangent, direction), slope, rtol=1e-6, atol=1e-6)
+
+
+def test_the_van_der_waals_solid_comes_out_the_same_to_rest():
+    constants = {"mu": {"unit": "MPa"}, "lambda_m": {"start": [5.0]}, "a": {"start": [0.2]}}
+    energy = f"mu*(-{M}*(log(1 - {ETA}) + {ETA}) - 2/3*a*((I1-3)/2)**1.5)"
+    written = model(energy, **constants)(mu=0.1, lambda_m=5.0, a=0.2)
+    built = create("van-der-waals", {"mu": 0.1, "lambda_m": 5.0, "a": 0.2, "beta": 0.0})
+    direction = np.array([[0.3, 0.2, 0.0], [0.0, -0.5, 0.1], [0.4, 0.0, 0.2]])
+    F = np.eye(3) + np.array([0.0, 1e-8, 1e-6, 1e-4, 1e-2, 0.3])[:, None, None] * direction
+    np.testing.assert_allclose(written.stress(F), built.stress(F), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(written.tangent(F), built.tangent(F), rtol=1e-6, atol=1e-6)
+
+
+def test_a_body_of_a_rough_energy_is_stretched_from_rest():
+    kind = model("mu/2*(I1-3) + c*(I1-3)**1.5", **MODULI)
+    block, up = box((1.0, 1.0, 1.0), (1, 1, 1), "hex27"), [Sliding("x0"), Sliding("y0"), Sliding("z0")]
+    material = kind(mu=0.1, c=0.02)
+    system = System(block, {"body": material}, [*up, Prescribed("z1", (None, None, 0.2))])
+    state = solve_path(system, [1.0])[-1].state
+    pull = system.forces(state)[0][block.points[:, 2] > 0.99, 2].sum()
+    assert pull == pytest.approx(float(material.uniaxial(1.2)), rel=1e-3)
 
 
 def test_functions_that_cannot_be_evaluated_are_refused_by_name(monkeypatch):

@@ -34,7 +34,7 @@ from typing_extensions import override
 from turgor.common.errors import InputError
 from turgor.common.optional import require
 from turgor.materials.hyperelastic import Hyperelastic, InvariantModel, StretchModel, modulus, number
-from turgor.materials.kinematics import Array
+from turgor.materials.kinematics import AT_REST, Array, zero_at_rest
 
 INVARIANTS = ("I1", "I2")
 STRETCHES = ("lambda1", "lambda2", "lambda3")
@@ -104,11 +104,12 @@ class InvariantExpression(InvariantModel):
 
     @override
     def derivatives(self, I1: Array, I2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-        # Round-off may bring an invariant below 3, where a root of I1 - 3 has no value.
-        excesses = (np.maximum(invariant - 3.0, 0.0) for invariant in (I1, I2))
+        # Roots of I1 - 3 have no derivative at rest, and below it, where round-off may bring it, no value.
+        excesses = [np.maximum(invariant - 3.0, AT_REST) for invariant in (I1, I2)]
         variables: dict[str, Array | float] = dict(zip(EXCESSES, excesses, strict=True))
         variables.update(self.parameters)
-        W, W1, W2, W11, W12, W22 = self.program(variables)
+        W, W1, W2, *second = self.program(variables)
+        W11, W12, W22 = (zero_at_rest(part, np.minimum(*excesses)) for part in second)
         return W, W1, W2, W11, W12, W22
 
 
@@ -293,7 +294,7 @@ def _differentiate(energy: Any, basis: tuple[str, ...], moduli: Sequence[str]) -
     if basis == INVARIANTS:
         excesses = [sympy.Symbol(name, nonnegative=True) for name in EXCESSES]
         W, x = energy.subs({invariant: 3 + y for invariant, y in zip(x, excesses, strict=True)}), excesses
-    at_rest = W.subs(dict.fromkeys(x, 0 if basis == INVARIANTS else 1))
+    at_rest = W.subs(dict.fromkeys(x, AT_REST if basis == INVARIANTS else 1))
     first = [sympy.diff(W, variable) for variable in x]
     pairs = itertools.combinations_with_replacement(range(len(x)), 2)
     second = [sympy.diff(first[i], x[j]) for i, j in pairs]

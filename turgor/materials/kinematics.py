@@ -14,6 +14,15 @@ IDENTITY: Array = np.eye(3)
 FOURTH: Array = np.einsum("ik,jl->ijkl", IDENTITY, IDENTITY)
 """The fourth-order identity δ_ik δ_jl."""
 
+AT_REST = 1e-13
+"""Ī₁ − 3 or Ī₂ − 3 up to which the body is at rest. Where a second derivative of W̄ grows without bound towards rest, as
+that of (Ī₁ − 3)^{3/2} does, what it adds to the tangent vanishes: there it counts as zero."""
+
+
+def zero_at_rest(derivative: Array, excess: Array) -> Array:
+    """Return a second derivative of W̄ by the invariants, zero where their `excess` over 3 is no more than AT_REST."""
+    return np.where(excess > AT_REST, derivative, 0.0)
+
 
 def diagonal_matrices(diagonal: Array) -> Array:
     """Return the matrices ``(..., 3, 3)`` with a given diagonal ``(..., 3)``."""

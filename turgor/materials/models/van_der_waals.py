@@ -9,11 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from turgor.materials.hyperelastic import InvariantModel, modulus, number
-from turgor.materials.kinematics import Array
-
-_REST = 1e-13
-"""Ĩ − 3 below which the body is at rest: the second derivative grows without bound there, but what it adds to the
-tangent vanishes with √(Ĩ − 3)."""
+from turgor.materials.kinematics import AT_REST, Array, zero_at_rest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,10 +44,9 @@ class VanDerWaals(InvariantModel):
         eta, half = np.sqrt(inside / m), np.sqrt(0.5 * inside)
         W = self.mu * (-m * (np.log1p(-eta) + eta) - 2.0 / 3.0 * self.a * half**3)
         slope = 0.5 * self.mu * (1.0 / (1.0 - eta) - self.a * half)
-        moved = inside > _REST
-        root = np.sqrt(np.where(moved, inside, 1.0))
+        root = np.sqrt(np.maximum(inside, AT_REST))
         curvature = 0.25 * self.mu / root * (1.0 / (np.sqrt(m) * (1.0 - eta) ** 2) - self.a / np.sqrt(2.0))
-        curvature = np.where(moved, curvature, 0.0)
+        curvature = zero_at_rest(curvature, inside)
         W, slope, curvature = (
             np.where(within, part, beyond) for part, beyond in ((W, np.inf), (slope, np.nan), (curvature, np.nan))
         )
