@@ -152,6 +152,20 @@ def test_a_written_material_fits_into_a_case(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))["recommended"] == "yeoh-1"
 
 
+def test_a_material_of_a_model_of_ones_own_fits_into_a_case_anywhere(tmp_path: Path, monkeypatch) -> None:
+    own = "name: mine\nenergy: mu/2*(I1 - 3)\nconstants: {mu: {unit: MPa}}\n"
+    (tmp_path / "own.yaml").write_text(own, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    result = turgor("fit", GOOD_TEST, "--model", "own.yaml", "--out", "fitted.yaml")
+    assert result.exit_code == 0
+    material = yaml.safe_load(Path("fitted.yaml").read_text(encoding="utf-8"))
+    case = tg.load_case(SMALL, [f"materials.body={json.dumps(material)}"])
+    assert case.materials["body"].build().shear_modulus == pytest.approx(0.1, rel=1e-3)
+    result = turgor("export", SMALL, "--set", f"materials.body={json.dumps(material)}")
+    assert result.exit_code == 2
+    assert "materials.body: CalculiX has no such material (found 'mine')" in result.stderr
+
+
 def test_a_fit_is_told_what_its_file_does_not_say() -> None:
     plain = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--json")
     told = turgor("fit", GOOD_TEST, "--model", "yeoh-1", "--strain-source", "crosshead", "--json")

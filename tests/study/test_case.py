@@ -186,6 +186,37 @@ def test_copies_of_data_files_have_names_of_their_own(tmp_path: Path) -> None:
     assert len({name.lower() for name in names.values()}) == len(files)
 
 
+OWN_MODEL = """
+name: my-rubber
+energy: mu/2*(I1 - 3)
+constants: {mu: {unit: MPa}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("{model: none.yaml, constants: {mu: 0.1 MPa}}", ["--set: materials.body.model", "no such file", "YAML"]),
+        ("{fit: pull.csv, models: [none.yaml]}", ["--set: materials.body.models.0", "no such file", "YAML"]),
+        ("{model: broken.yaml, constants: {mu: 0.1 MPa}}", ["broken.yaml: energy", "I3", "one of I1, I2"]),
+        ("{fit: pull.csv, models: [broken.yaml]}", ["broken.yaml: energy", "I3", "one of I1, I2"]),
+        ("{model: own.yaml, constants: {mu: 0.1}}", ["materials.body.constants.mu", "unit"]),
+        ("{model: own.yaml, constants: {C10: 0.1 MPa}}", ["materials.body.constants.C10", "my-rubber", "mu [MPa]"]),
+        ("{fit: pull.csv, models: [own.yaml, copy.yaml]}", ["materials.body.models", "same name", "my-rubber"]),
+    ],
+)
+def test_what_is_wrong_with_a_model_of_ones_own(small_tube: Path, change: str, words: list[str]) -> None:
+    for name in ("own", "copy"):
+        small_tube.with_name(f"{name}.yaml").write_text(OWN_MODEL, encoding="utf-8")
+    small_tube.with_name("broken.yaml").write_text(OWN_MODEL.replace("I1", "I3"), encoding="utf-8")
+    curve = "strain,stress (MPa)\n" + "".join(f"{0.1 * k},{0.01 * k}\n" for k in range(8))
+    small_tube.with_name("pull.csv").write_text(curve, encoding="utf-8")
+    with pytest.raises(InputError) as found:
+        build_materials(load_case(small_tube, [f"materials.body={change}"]).materials)
+    for word in words:
+        assert word in str(found.value)
+
+
 @pytest.mark.parametrize(
     ("change", "key"),
     [

@@ -259,6 +259,45 @@ def test_the_test_data_go_with_the_run(small_tube: Path, tmp_path: Path) -> None
         run(load_case(again.folder / "case.yaml"), moved, resume=True)
 
 
+OWN_MODEL = """
+name: my-rubber
+energy: mu/2*(I1 - 3) + c*(I2 - 3)
+constants: {mu: {unit: MPa}, c: {unit: MPa}}
+"""
+OWN = {
+    "model": "materials.body={model: own/rubber.yaml, constants: {mu: 0.1 MPa, c: 1 kPa}, poisson: 0.499}",
+    "fit": "materials.body={fit: pull.csv, models: [neo-hookean, own/rubber.yaml], poisson: 0.499}",
+}
+
+
+@pytest.mark.usefixtures("unreported")
+@pytest.mark.parametrize("kind", OWN)
+def test_a_model_of_ones_own_goes_with_the_run(kind: str, small_tube: Path, tmp_path: Path) -> None:
+    own = small_tube.parent / "own" / "rubber.yaml"
+    own.parent.mkdir()
+    own.write_text(OWN_MODEL, encoding="utf-8")
+    x = np.linspace(1.0, 3.0, 41)
+    stress = (0.1 + 0.02 / x) * (x - x**-2)
+    lines = [f"{a - 1:.5f},{b:.8f}" for a, b in zip(x, stress, strict=True)]
+    small_tube.with_name("pull.csv").write_text("\n".join(["Strain,Stress (MPa)", *lines]), encoding="utf-8")
+    case = load_case(small_tube, [OWN[kind], "solver.steps=1"])
+    done = run(case, tmp_path / "run")
+    assert run(case, tmp_path / "run", resume=True).converged
+    resolved = yaml.safe_load((done.folder / "case.yaml").read_text(encoding="utf-8"))["materials"]["body"]
+    assert (resolved["model"] if kind == "model" else resolved["models"][1]) == "data/rubber.yaml"
+    if kind == "fit":
+        document = RunStore.open(done.folder).fit
+        assert document is not None
+        assert document["recommended"] == "my-rubber"
+    moved = done.folder.rename(tmp_path / "elsewhere")
+    own.unlink()
+    again = run(load_case(moved / "case.yaml"), tmp_path / "again")
+    same_motion(again.folder, moved)
+    (moved / "data" / "rubber.yaml").write_text(OWN_MODEL.replace("mu/2", "mu"), encoding="utf-8")
+    with pytest.raises(InputError, match="another case"):
+        run(load_case(again.folder / "case.yaml"), moved, resume=True)
+
+
 @pytest.mark.usefixtures("unreported")
 @pytest.mark.parametrize("kept", [False, True])
 def test_who_waits_for_the_compiler_is_told_so(

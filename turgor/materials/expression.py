@@ -157,13 +157,13 @@ def load_model(path: str | Path) -> type[Hyperelastic]:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise InputError("this is not YAML", file=file, expected=_FORMAT) from error
     try:
-        return define_model(document)
+        return define_model(document, str(file.resolve()))
     except InputError as error:
         raise error.at(file=file) from error
 
 
-def define_model(document: object) -> type[Hyperelastic]:
-    """Return the model of a parsed file; see :func:`load_model`."""
+def define_model(document: object, file: str = "") -> type[Hyperelastic]:
+    """Return the model of a parsed `file`; see :func:`load_model`."""
     if not isinstance(document, dict) or not {"name", "energy", "constants"} <= document.keys():
         raise InputError("this is not a model", expected=_FORMAT)
     if unknown := document.keys() - {"name", "energy", "constants", "source"}:
@@ -178,7 +178,12 @@ def define_model(document: object) -> type[Hyperelastic]:
         f"User_{name.replace('-', '_')}",
         [(key, float, definition) for key, definition in fields.items()],
         bases=(base,),
-        namespace={"name": name, "program": program, "__doc__": f"W̄ = {document['energy']} (a user's model)"},
+        namespace={
+            "name": name,
+            "file": file,
+            "program": program,
+            "__doc__": f"W̄ = {document['energy']} (a user's model)",
+        },
         frozen=True,
         kw_only=True,
     )

@@ -114,7 +114,13 @@ def _kinds(names: Model | Sequence[Model]) -> list[type[Hyperelastic]]:
     found: list[type[Hyperelastic]] = []
     for name in chosen:
         found.extend(known_models().values() if name == "all" else [find_model(name)])
-    return list(dict.fromkeys(found))
+    kinds = list(dict.fromkeys(found))
+    names = [kind.name for kind in kinds]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        # A fit is known by the name of its model.
+        expected = "models with a name of their own each, every one once"
+        raise InputError("two of the models have the same name", key="models", value=twice, expected=expected)
+    return kinds
 
 
 def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[MaterialTest, ...]:

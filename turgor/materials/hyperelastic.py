@@ -75,6 +75,8 @@ class Hyperelastic:
 
     name: ClassVar[str] = ""
     aliases: ClassVar[tuple[str, ...]] = ()
+    file: ClassVar[str] = ""
+    """The file of a user's model, which names it in a case file; empty for a model of the package."""
     basis: ClassVar[str] = ""
     smooth_at_rest: ClassVar[bool] = True
     """Whether W̄ has a third derivative in the undeformed state."""

@@ -39,6 +39,11 @@ def models() -> dict[str, type[Hyperelastic]]:
     return found
 
 
+def is_model_file(name: str) -> bool:
+    """Say whether the name of a model is the path of a file that holds one."""
+    return str(name).endswith((".yaml", ".yml"))
+
+
 def find_model(name: str | type[Hyperelastic]) -> type[Hyperelastic]:
     """Return the model that is called `name`, has it among its aliases, or is written in the file `name` (``*.yaml``).
 
@@ -51,7 +56,7 @@ def find_model(name: str | type[Hyperelastic]) -> type[Hyperelastic]:
     """
     if isinstance(name, type):
         return name
-    if str(name).endswith((".yaml", ".yml")):
+    if is_model_file(name):
         return load_model(name)
     for model in models().values():
         if name == model.name or name in model.aliases:

@@ -87,7 +87,7 @@ def material_yaml(report: FitReport) -> str:
         for constant, value in zip(material.constants(), material.parameters.values(), strict=True)
     }
     volume = {"bulk_modulus": f"{material.bulk_modulus!r} MPa"} if report.measured_volume else {}
-    return yaml.safe_dump({"model": material.name, "constants": constants, **volume}, sort_keys=False)
+    return yaml.safe_dump({"model": material.file or material.name, "constants": constants, **volume}, sort_keys=False)
 
 
 def curves(report: FitReport) -> go.Figure:

@@ -31,7 +31,7 @@ from turgor.study.boundary import DisplacementCase, GravityCase, Load, PressureC
 from turgor.study.control import ArcLengthControl, ControlCase, PressureControl
 from turgor.study.course import Course, LoadCourse, course_by
 from turgor.study.geometry import Geometry
-from turgor.study.materials import FittedMaterial, MaterialChoice
+from turgor.study.materials import MaterialChoice
 from turgor.study.measures import MeasureChoice
 from turgor.study.reading import override, read_mapping
 from turgor.study.setup import Setup
@@ -217,13 +217,11 @@ class Case(Draft):
 
     @property
     def data_files(self) -> list[Path]:
-        """The files that the case names, each once: tests, measured motion and shapes."""
-        tests = [
-            path for choice in self.materials.values() if isinstance(choice, FittedMaterial) for path in choice.fit
-        ]
+        """The files that the case names, each once: tests and models of materials, measured motion and shapes."""
+        of_materials = [path for choice in self.materials.values() for path in choice.files]
         data = self.model_dump(mode="json", exclude_none=True, include={"geometry", "regions"})
         measured = [path for choice in self.measures or () for path in choice.files]
-        return list(dict.fromkeys([*tests, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
+        return list(dict.fromkeys([*of_materials, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
 
     def course(self, system: System) -> Course:
         """Return the course of the run: which states are asked for, and how the solver gets there.
@@ -254,8 +252,7 @@ class Case(Draft):
         for shape in _with_file([data["geometry"], data.get("regions", {})]):
             shape["file"] = (files or {}).get(Path(shape["file"]), shape["file"])
         for region, material in self.materials.items():
-            if isinstance(material, FittedMaterial):
-                data["materials"][region]["fit"] = [(files or {}).get(path, str(path)) for path in material.fit]
+            data["materials"][region] |= material.renamed(files or {})
         if self.measures is not None:
             data["measures"] = [choice.plain(files) for choice in self.measures]
         data = {key: data[key] for key in _FIRST} | {key: part for key, part in data.items() if part not in ([], {})}

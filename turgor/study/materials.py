@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -16,6 +16,7 @@ from turgor.materials import Hyperelastic, create, find_model
 from turgor.materials.fit import fit, parse_strain_range
 from turgor.materials.fit_result import FitReport
 from turgor.materials.library import find
+from turgor.materials.registry import is_model_file
 from turgor.study.specimen import SpecimenCase
 from turgor.study.validation import StrictModel, collected, invalid, under
 
@@ -43,9 +44,20 @@ def _as_list(value: object) -> object:
     return [value] if isinstance(value, (str, Path)) else value
 
 
-def _known_model(name: str) -> str:
+def _known_model(name: str, info: ValidationInfo) -> str:
+    if is_model_file(name):
+        return str(in_case_folder(name, info, "YAML"))
     with collected():
         return name if name == ALL else find_model(name).name
+
+
+def _written(model: str, files: Mapping[Path, str]) -> str:
+    """Return the name of a model to write, of a file that of its copy."""
+    return files.get(Path(model), model) if is_model_file(model) else model
+
+
+def _model_files(models: Iterable[str]) -> tuple[Path, ...]:
+    return tuple(Path(model) for model in models if is_model_file(model))
 
 
 def _known_set(name: str) -> str:
@@ -90,7 +102,10 @@ class _Compressible(StrictModel):
 
 
 class ModelMaterial(_Compressible):
-    """A model with its constants, each with its unit: ``{model: yeoh-1, constants: {C10: 0.05 MPa}}``."""
+    """A model with its constants, each with its unit: ``{model: yeoh-1, constants: {C10: 0.05 MPa}}``.
+
+    The name of a user's model is the path of its file.
+    """
 
     model: ModelName
     constants: dict[str, str | float | int]
@@ -105,10 +120,19 @@ class ModelMaterial(_Compressible):
                 key = f"constants.{constant.name}"
                 values[constant.name] = to_internal(values[constant.name], constant.dimension, key=key)
         try:
-            return create(self.model, values, convention=self.convention, **self.volume_change())
+            return create(kind, values, convention=self.convention, **self.volume_change())
         except InputError as error:
             is_constant = error.key and error.key not in type(self).model_fields
             raise under(error, "constants") if is_constant else error from error
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file of a user's model."""
+        return _model_files([self.model])
+
+    def renamed(self, files: Mapping[Path, str]) -> dict[str, Any]:
+        """Return the keys that name files, with the names of their copies."""
+        return {"model": _written(self.model, files)}
 
 
 class LibraryMaterial(StrictModel):
@@ -123,6 +147,16 @@ class LibraryMaterial(StrictModel):
         if entry.unusable:
             log.warning("%s: %s", entry.name, entry.unusable)
         return entry.build if self.density is None else dataclasses.replace(entry.build, density=self.density)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """None."""
+        return ()
+
+    def renamed(self, files: Mapping[Path, str]) -> dict[str, Any]:
+        """Return no keys, as none names a file."""
+        del files
+        return {}
 
 
 class FittedMaterial(_Compressible):
@@ -157,7 +191,17 @@ class FittedMaterial(_Compressible):
         best, asked = report.best, self.volume_change()
         if report.measured_volume and all(asked[key] is None for key in ("bulk_modulus", "D1", "poisson")):
             asked["bulk_modulus"] = best.bulk_modulus
-        return create(best.name, best.parameters, **asked)
+        return create(type(best), best.parameters, **asked)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files of the tests and of the user's models."""
+        return (*self.fit, *_model_files(self.models))
+
+    def renamed(self, files: Mapping[Path, str]) -> dict[str, Any]:
+        """Return the keys that name files, with the names of their copies."""
+        tests = [files.get(path, str(path)) for path in self.fit]
+        return {"fit": tests, "models": [_written(model, files) for model in self.models]}
 
 
 _KINDS: dict[str, type[StrictModel]] = {"library": LibraryMaterial, "model": ModelMaterial, "fit": FittedMaterial}
