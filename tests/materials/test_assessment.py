@@ -58,6 +58,19 @@ def test_map_of_a_locking_material_has_no_value_beyond():
     assert np.nanmin(margin) > 0
 
 
+def test_a_run_is_warned_of_a_material_that_locks():
+    """λ² + 2/λ, 2 λ² + λ⁻⁴ and λ² + 1 + λ⁻² are 3 + Jm there."""
+    gent = create("gent", {"mu": 0.1, "Jm": 1.0})
+    assert warnings_in_use(gent, 1.3) == ()
+    (locks,) = warnings_in_use(gent, 1.64)
+    assert locks.startswith("the material locks where the run may go (equibiaxial beyond a stretch of 1.36; planar")
+    assert "uniaxial" not in locks
+    found = assess(gent).as_dict()
+    assert found["digit_sensitivity"] < 0.01
+    assert found["locks"]["planar"]["tension"] == pytest.approx(0.5 * (1.0 + 5.0**0.5))
+    json.dumps(found, allow_nan=False)
+
+
 def test_a_run_is_warned():
     assert not warnings_in_use(get("dragon-skin-10-slow-ogden-2"), 3.0)
     (unstable, *_) = warnings_in_use(get("dragon-skin-10-slow-mooney-rivlin"), 2.0)

@@ -9,9 +9,11 @@ from turgor.materials import create
 from turgor.materials.library import get
 from turgor.materials.registry import models
 from turgor.materials.stability import (
+    MODES,
     digit_sensitivity,
     drucker_margin,
     drucker_matrix,
+    locking,
     principal_stretches,
     stable_range,
     stable_up_to,
@@ -116,6 +118,38 @@ def test_cancelling_constants_are_sensitive_to_their_digits():
     assert digit_sensitivity(get("tpu-0deg-mooney-rivlin-2"), 6.0, digits=5) < 1e-4
 
 
+LOCKS = {
+    "gent": {"mu": 0.1, "Jm": 1.0},
+    "van-der-waals": {"mu": 0.1, "lambda_m": 2.0, "a": 0.2, "beta": 0.0},
+    "extended-tube": {"Gc": 0.1, "delta": 0.7, "Ge": 0.1, "beta": 1.0},
+}
+"""Materials that lock, at these excesses of I1 over 3."""
+EXCESS = {"gent": 1.0, "van-der-waals": 1.0, "extended-tube": 0.7**-2}
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_a_material_locks_where_its_chains_are_at_their_end(name):
+    material = create(name, LOCKS[name])
+    found = locking(material)
+    assert [(mode, *sorted(places)) for mode, places in found.items()] == [(m, "compression", "tension") for m in MODES]
+    for mode, places in found.items():
+        for stretch in places.values():
+            excess = (principal_stretches(mode, np.array(stretch)) ** 2).sum() - 3.0
+            assert excess == pytest.approx(EXCESS[name], rel=1e-9)
+    assert verdict(material).locked == found
+    assert stable_up_to(material, 6.0)
+    assert locking(material, 0.95, 1.05) == {}
+    assert locking(create("neo-hookean", {"C10": 0.1})) == {}
+
+
+@pytest.mark.parametrize("name", LOCKS)
+@pytest.mark.parametrize("largest", [1.2, 2.0, 6.0])
+def test_digits_are_judged_short_of_where_a_material_locks(name, largest):
+    assert 1e-4 < digit_sensitivity(create(name, LOCKS[name]), largest) < 0.02
+
+
 def test_verdict_says_it_in_words():
+    locks = "stable in stretches 0.8–2; locks: uniaxial beyond 1.68, equibiaxial beyond 1.36, planar beyond 1.62"
+    assert str(verdict(create("gent", LOCKS["gent"]), 0.8, 2.0)) == locks
     assert str(verdict(get("tpu-0deg-mooney-rivlin-2"))) == "stable in stretches 0.3–6"
     assert "equibiaxial beyond 1.1" in str(verdict(get("tpu-0deg-mooney-rivlin-5")))

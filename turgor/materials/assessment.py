@@ -12,9 +12,11 @@ from turgor.materials.kinematics import Array
 from turgor.materials.stability import (
     MODES,
     STRETCHES,
+    Places,
     Verdict,
     digit_sensitivity,
     drucker_margin,
+    locking,
     stable_up_to,
     verdict,
 )
@@ -33,7 +35,7 @@ class Assessment:
     shear_modulus, young_modulus, bulk_modulus, poisson_ratio
         Of the undeformed state, MPa and 1.
     drucker
-        Where Drucker's inequality holds, mode by mode.
+        Where Drucker's inequality holds, mode by mode, and where the material locks.
     elliptic
         Whether the incompressible material is strongly elliptic at all sampled principal stretches of the range.
     monotonic
@@ -61,6 +63,7 @@ class Assessment:
             "drucker_stable": self.drucker.stable,
             "drucker": str(self.drucker),
             "drucker_lost": self.drucker.lost,
+            "locks": self.drucker.locked,
             "strongly_elliptic": self.elliptic,
             "monotonic_stretches": {mode: list(span) for mode, span in self.monotonic.items()},
             "digit_sensitivity": self.digit_sensitivity if np.isfinite(self.digit_sensitivity) else None,
@@ -163,14 +166,18 @@ def warnings_in_use(material: Hyperelastic, largest_stretch: float) -> tuple[str
     found = []
     if not stable_up_to(material, largest_stretch):
         spans = verdict(material, 1.0 / largest_stretch**2, largest_stretch)
-        lost = "; ".join(
-            f"{mode} beyond a stretch of {places['tension']:.3g}"
-            for mode, places in spans.lost.items()
-            if "tension" in places
-        )
-        found.append(f"the material is unstable where the run may go ({lost or 'in compression'})")
+        found.append(f"the material is unstable where the run may go ({_tension(spans.lost) or 'in compression'})")
+    if locked := locking(material, 1.0, largest_stretch):
+        found.append(f"the material locks where the run may go ({_tension(locked)}) and cannot be stretched beyond")
     sensitivity = digit_sensitivity(material, largest_stretch)
     if not sensitivity < SENSITIVITY_LIMIT:
         found.append(f"four digits of its constants do not fix its stress (changes by {sensitivity:.0%})")
     found += implausible_ratios(biaxial_ratios(material))[:1]
     return tuple(found)
+
+
+def _tension(found: Places) -> str:
+    """Say where in tension; uniaxial compression is equibiaxial tension, and the other way round."""
+    return "; ".join(
+        f"{mode} beyond a stretch of {places['tension']:.3g}" for mode, places in found.items() if "tension" in places
+    )

@@ -8,10 +8,12 @@ says that the 2×2 matrix ∂²Ŵ/∂ε∂ε is positive definite; it is the mat
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.materials.kinematics import IDENTITY, Array
@@ -31,6 +33,9 @@ STRETCHES = (0.3, 6.0)
 _SAMPLES = 400
 _ROUNDS = 5
 """How often a loss is looked for, each time between the two samples that hold it."""
+
+_SHORT_OF_LOCKING = 0.8
+"""The part of the strain at which a material locks up to which the digits of its constants are judged."""
 
 
 def principal_stretches(mode: str, stretch: Array) -> Array:
@@ -95,8 +100,6 @@ def stable_range(
 
 def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
     """Return the first stretch on the way from 1 to `end` at which stability is lost."""
-    if end == 1.0:
-        return None
 
     def margin(log_stretch: Array) -> Array:
         # Beyond its locking stretch a material has infinite energy: it does not go there, which is not a loss.
@@ -108,10 +111,20 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
             found = _smallest_eigenvalue(np.where(finite[..., None, None], H, -IDENTITY))
         return np.asarray(np.where(locked, 1.0, found), dtype=float)
 
+    return _end_of(lambda log_stretch: margin(log_stretch) > 0.0, end)
+
+
+def _end_of(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> float | None:
+    """Return the stretch on the way from 1 to `end` up to which something `holds`, a function of log stretches.
+
+    None if it holds all the way.
+    """
+    if end == 1.0:
+        return None
     # Quadratic spacing: sets that are lost, are often lost within a few per cent of strain.
     path = np.log(end) * np.linspace(0.0, 1.0, _SAMPLES) ** 2
     for _ in range(_ROUNDS):
-        lost = np.flatnonzero(~(margin(path) > 0.0))
+        lost = np.flatnonzero(~holds(path))
         if not len(lost):
             return None
         if lost[0] == 0:
@@ -121,12 +134,37 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
     return float(np.exp(good))
 
 
+Places = dict[str, dict[str, float]]
+"""Stretches by mode and ``"compression"`` or ``"tension"``; what has none is left out."""
+
+
+def locking(material: Hyperelastic, low: float = STRETCHES[0], high: float = STRETCHES[1]) -> Places:
+    """Return the stretches between `low` ≤ 1 and `high` ≥ 1 beyond which the energy is infinite: there it locks."""
+    found: Places = {}
+    for mode in _PATHS:
+        for side, end in (("compression", low), ("tension", high)):
+            is_reached = functools.partial(_is_reached, material, mode)
+            place = None if is_reached(np.log([end])).all() else _end_of(is_reached, end)
+            if place is not None:
+                found.setdefault(mode, {})[side] = place
+    return found
+
+
+def _is_reached(material: Hyperelastic, mode: str, log_stretch: Array) -> NDArray[np.bool_]:
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return ~np.isposinf(material.principal(principal_stretches(mode, np.exp(log_stretch)))[0])
+
+
 @dataclass(frozen=True)
 class Verdict:
-    """Where a material is stable: for each mode the stretches around 1, cut at the range that was examined."""
+    """Where a material is stable: for each mode the stretches around 1, cut at the range that was examined.
+
+    ``locked`` are the places where it locks (:func:`locking`): to go there is no loss of stability, but impossible.
+    """
 
     examined: tuple[float, float]
     ranges: dict[str, tuple[float, float]]
+    locked: Places = field(default_factory=dict)
 
     @property
     def stable(self) -> bool:
@@ -134,9 +172,9 @@ class Verdict:
         return all(span == self.examined for span in self.ranges.values())
 
     @property
-    def lost(self) -> dict[str, dict[str, float]]:
-        """The stretches at which stability is lost, by mode and ``"compression"`` or ``"tension"``."""
-        found: dict[str, dict[str, float]] = {}
+    def lost(self) -> Places:
+        """The stretches at which stability is lost."""
+        found: Places = {}
         for mode, (low, high) in self.ranges.items():
             places = {}
             if low > self.examined[0]:
@@ -149,19 +187,24 @@ class Verdict:
 
     def __str__(self) -> str:
         low, high = self.examined
+        locks = f"; locks: {_in_words(self.locked)}" if self.locked else ""
         if self.stable:
-            return f"stable in stretches {low:.3g}–{high:.3g}"
-        parts = [
-            f"{mode} {'below' if side == 'compression' else 'beyond'} {stretch:.3g}"
-            for mode, places in self.lost.items()
-            for side, stretch in places.items()
-        ]
-        return f"unstable: {', '.join(parts)} (stretches {low:.3g}–{high:.3g} examined)"
+            return f"stable in stretches {low:.3g}–{high:.3g}{locks}"
+        return f"unstable: {_in_words(self.lost)}{locks} (stretches {low:.3g}–{high:.3g} examined)"
+
+
+def _in_words(found: Places) -> str:
+    return ", ".join(
+        f"{mode} {'below' if side == 'compression' else 'beyond'} {stretch:.3g}"
+        for mode, places in found.items()
+        for side, stretch in places.items()
+    )
 
 
 def verdict(material: Hyperelastic, low: float = STRETCHES[0], high: float = STRETCHES[1]) -> Verdict:
     """Return where between the stretches `low` < 1 and `high` > 1 the material is stable, mode by mode."""
-    return Verdict((low, high), {mode: stable_range(material, mode, low, high) for mode in _PATHS})
+    ranges = {mode: stable_range(material, mode, low, high) for mode in _PATHS}
+    return Verdict((low, high), ranges, locking(material, low, high))
 
 
 def stable_up_to(material: Hyperelastic, largest_stretch: float) -> bool:
@@ -178,16 +221,22 @@ def digit_sensitivity(material: Hyperelastic, largest_stretch: float, digits: in
 
     The largest sum over the constants of |∂P/∂c| times half a unit in c's last digit, for uniaxial stretches up to
     `largest_stretch`, relative to the largest stress there. A set that loses its meaning by rounding is not a
-    measurement: near-equal Ogden exponents with huge opposite moduli, or high-order polynomials.
+    measurement: near-equal Ogden exponents with huge opposite moduli, or high-order polynomials. Of a material that
+    locks before, the strains up to four fifths of that count: near the limit every digit of it changes the stress.
     """
-    stretch = np.linspace(1.0, largest_stretch, 40)
-    exact = material.uniaxial(stretch)
-    values = np.array(list(material.parameters.values()))
-    change = np.zeros_like(stretch)
-    for i, value in enumerate(values):
-        if value == 0.0:
-            continue
-        moved = values.copy()
-        moved[i] += 0.5 * 10.0 ** (np.floor(np.log10(abs(value))) + 1 - digits)
-        change += np.abs(type(material).trial(moved.tolist()).uniaxial(stretch) - exact)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        limit = _end_of(lambda log_stretch: np.isfinite(material.uniaxial(np.exp(log_stretch))), largest_stretch)
+        end = largest_stretch if limit is None else 1.0 + _SHORT_OF_LOCKING * (limit - 1.0)
+        stretch = np.linspace(1.0, end, 40)
+        exact = material.uniaxial(stretch)
+        values = np.array(list(material.parameters.values()))
+        change = np.zeros_like(stretch)
+        for i, value in enumerate(values):
+            if value == 0.0:
+                continue
+            moved = values.copy()
+            moved[i] += 0.5 * 10.0 ** (np.floor(np.log10(abs(value))) + 1 - digits)
+            change += np.abs(type(material).trial(moved.tolist()).uniaxial(stretch) - exact)
+    # Where rounding leaves no stress at all, nothing is left of the set.
+    change = np.where(np.isfinite(change), change, np.inf)
     return float(change.max() / np.abs(exact).max())
