@@ -144,3 +144,32 @@ def test_more_constants_than_points():
     material = create("neo-hookean", {"C10": 0.1})
     with pytest.raises(InputError, match="9 constants"):
         fit(synthetic(material, ["uniaxial"], points=6), "mooney-rivlin-9")
+
+
+def test_of_all_models_those_with_more_constants_than_points_are_left_out(caplog):
+    tests = synthetic(create("yeoh-1", {"C10": 0.1}), ["uniaxial"], points=5)
+    with caplog.at_level("WARNING"):
+        report = fit(tests)
+    (warning,) = caplog.messages
+    assert warning.endswith("only 5 points: mooney-rivlin-9 (9 constants), ogden-3 (6 constants)")
+    assert "only 5 points: mooney-rivlin-9" in report.reason
+    tried = {found.model for found in report.fits if not found.constrained}
+    assert tried == set(models()) - {"mooney-rivlin-9", "ogden-3"}
+    assert report.recommended is not None
+
+
+def test_a_model_that_is_named_is_not_left_out():
+    tests = synthetic(create("yeoh-1", {"C10": 0.1}), ["uniaxial"], points=5)
+    with pytest.raises(InputError, match="ogden-3 has 6 constants, the tests have only 5 points"):
+        fit(tests, ["all", "ogden-3"])
+
+
+def test_points_of_a_test_that_does_not_count_determine_nothing():
+    tests = synthetic(create("yeoh-1", {"C10": 0.1}), ["uniaxial", "planar"], points=5)
+    with pytest.raises(InputError, match="ogden-3 has 6 constants, the tests have only 5 points"):
+        fit(tests, "ogden-3", weights=[1.0, 0.0])
+
+
+def test_a_test_without_points_is_refused():
+    with pytest.raises(InputError, match="a test without points"):
+        fit(MaterialTest("uniaxial", np.zeros(0), np.zeros(0)))

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from turgor.common.errors import InputError
+from turgor.common.log import logger
 from turgor.materials.compressible import fit_bulk_modulus, fit_compressible
 from turgor.materials.fit_result import CONSTRAINED, Fit, FitReport, biaxial_ratios, recommend
 from turgor.materials.hyperelastic import Hyperelastic
@@ -22,6 +23,8 @@ from turgor.materials.registry import models as known_models
 from turgor.materials.stability import digit_sensitivity, principal_stretches, stable_up_to, verdict
 from turgor.materials.statistics import statistics
 from turgor.materials.testdata import read_tests
+
+LOG = logger("materials")
 
 Data = str | Path | MaterialTest
 Model = str | type[Hyperelastic]
@@ -53,7 +56,8 @@ def fit(
     data
         Files or tests; several are fitted together.
     models
-        Names of models, files of user models (``*.yaml``), classes, or ``"all"``.
+        Names of models, files of user models (``*.yaml``), classes, or ``"all"``: every model of the package with no
+        more constants than the tests have points; a warning says which are left out.
     strain_range
         Engineering strains between which the tests are used: ``(0, 3)``, ``"0:3"`` or ``"0:300%"``.
     error
@@ -81,7 +85,7 @@ def fit(
     InputError
         If the data, a name or an option is wrong.
     """
-    kinds = _kinds(models)
+    kinds, named = _kinds(models)
     span = parse_strain_range(strain_range)
     tests = _tests(data, specimen)
     mechanical = tuple(test for test in tests if test.mode != "volumetric")
@@ -97,30 +101,47 @@ def fit(
         raise InputError("this is no largest stretch", key="stable_to", value=stable_to, expected="a number from 1 up")
     volumetric = [test for test in tests if test.mode == "volumetric"]
     fits: list[Fit] = []
+    left_out, remark = _left_out(kinds, named, problem)
+    if remark:
+        LOG.warning("%s", remark)
     for kind in kinds:
-        fits.extend(_fits_of(kind, problem, stability, stretch, volumetric))
+        if kind not in left_out:
+            fits.extend(_fits_of(kind, problem, stability, stretch, volumetric))
     if not fits:
         raise InputError("no constants of these models keep the limits", key="models", expected="other models")
     fits.sort(key=lambda found: found.aic - 2.0 * len(found.parameters) if error == "relative" else found.residual_norm)
     largest = max(float(np.abs(test.stress).max()) for test in problem.counted)
     best, reason = recommend(fits, largest)
+    reason += f". {remark.capitalize()}" if remark else ""
     return FitReport(tuple(fits), best.model if best else None, reason, mechanical + tuple(volumetric), span, error)
 
 
-def _kinds(names: Model | Sequence[Model]) -> list[type[Hyperelastic]]:
+def _kinds(names: Model | Sequence[Model]) -> tuple[list[type[Hyperelastic]], set[type[Hyperelastic]]]:
+    """Return the models to fit, and which of them were asked for by name."""
     chosen = [names] if isinstance(names, (str, type)) else list(names)
     if not chosen:
         raise InputError("no model is named", key="models", expected="names of models, or all")
+    named = {name: find_model(name) for name in chosen if name != "all"}
     found: list[type[Hyperelastic]] = []
     for name in chosen:
-        found.extend(known_models().values() if name == "all" else [find_model(name)])
+        found.extend(known_models().values() if name == "all" else [named[name]])
     kinds = list(dict.fromkeys(found))
-    names = [kind.name for kind in kinds]
-    if twice := next((name for name in names if names.count(name) > 1), None):
+    called = [kind.name for kind in kinds]
+    if twice := next((name for name in called if called.count(name) > 1), None):
         # A fit is known by the name of its model.
         expected = "models with a name of their own each, every one once"
         raise InputError("two of the models have the same name", key="models", value=twice, expected=expected)
-    return kinds
+    return kinds, set(named.values())
+
+
+def _left_out(
+    kinds: Sequence[type[Hyperelastic]], named: set[type[Hyperelastic]], problem: Problem
+) -> tuple[list[type[Hyperelastic]], str]:
+    """Return the models that nobody named and that have more constants than the tests points, and what says so."""
+    points = len(problem.of_counted.stress)
+    many = [kind for kind in kinds if kind not in named and len(kind.constants()) > points]
+    listing = ", ".join(f"{kind.name} ({len(kind.constants())} constants)" for kind in many)
+    return many, f"models left out, for the tests have only {points} points: {listing}" if many else ""
 
 
 def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[MaterialTest, ...]:
@@ -130,6 +151,9 @@ def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[Mate
         tests.extend([item] if isinstance(item, MaterialTest) else read_tests(item, specimen))
     if not tests:
         raise InputError("no test data are given", key="data", expected="at least one file")
+    for test in tests:
+        if not len(test.stretch):
+            raise InputError("a test without points", file=test.file or None, key="data", expected="some points")
     return tuple(tests)
 
 

@@ -158,12 +158,12 @@ def solve(model: type[Hyperelastic], problem: Problem, limits: Limits | None = N
     Raises
     ------
     InputError
-        If the tests have fewer points than the model has constants.
+        If the tests that count have fewer points than the model has constants.
     """
-    constants = model.constants()
-    if len(problem.stress) < len(constants):
+    constants, points = model.constants(), len(problem.of_counted.stress)
+    if points < len(constants):
         raise InputError(
-            f"{model.name} has {len(constants)} constants, the tests have only {len(problem.stress)} points",
+            f"{model.name} has {len(constants)} constants, the tests have only {points} points",
             key="models",
             expected="more points or a model with fewer constants",
         )
