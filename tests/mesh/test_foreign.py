@@ -164,3 +164,32 @@ def test_mixed_cells_are_refused(tmp_path):
     meshio.vtu.write(tmp_path / "house.vtu", meshio.Mesh(points, blocks))
     with pytest.raises(InputError, match=r"mixes cells of several kinds .*hexahedron, pyramid"):
         read(tmp_path / "house.vtu")
+
+
+@pytest.mark.parametrize("size", [4, 10])
+def test_cells_that_are_there_twice_are_refused_with_the_place_of_the_first(size, tmp_path):
+    points, cells = hollow()
+    # The corners come in another order, as where another part of the file repeats a cell.
+    again = cells[[40, 9], :][:, [1, 2, 0, 3, 5, 6, 4, 8, 9, 7]]
+    x, y, z = points[cells[9, :4]].mean(axis=0)
+    repeated = meshio.Mesh(points, [("tetra" if size == 4 else "tetra10", np.vstack([cells, again])[:, :size])])
+    meshio.vtu.write(tmp_path / "twice.vtu", repeated)
+    place = rf"cells are there more than once: 2 of {len(cells) + 2}, .*\({x:.6g}, {y:.6g}, {z:.6g}\)"
+    with pytest.raises(InputError, match=place):
+        read(tmp_path / "twice.vtu")
+
+
+def test_a_face_of_three_cells_is_refused_with_its_place(tmp_path):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [1, 1, 2]])
+    cells = np.array([[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]])
+    meshio.vtu.write(tmp_path / "three.vtu", meshio.Mesh(points, [("tetra", cells)]))
+    with pytest.raises(InputError, match=r"faces belong to more than two cells: 1, .*\(0.333333, 0.333333, 0\)"):
+        read(tmp_path / "three.vtu")
+
+
+def test_an_edge_of_three_plane_cells_is_refused(tmp_path):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [1, 1, 0]])
+    cells = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    meshio.vtu.write(tmp_path / "three.vtu", meshio.Mesh(points, [("triangle", cells)]))
+    with pytest.raises(InputError, match=r"edges belong to more than two cells: 1, .*\(0.5, 0\)"):
+        read(tmp_path / "three.vtu")

@@ -25,6 +25,14 @@ def boundary_faces(cells: Ints) -> Ints:
     return boundary
 
 
+def crowded_faces(cells: Ints) -> Ints:
+    """Return the faces that belong to more than two cells, each once, shape ``(k, nodes_per_face)``."""
+    faces = all_faces(cells)
+    _, first, counts = np.unique(row_numbers(_keys(faces)), return_index=True, return_counts=True)
+    crowded: Ints = faces[np.sort(first[counts > 2])]
+    return crowded
+
+
 def host_cells(cells: Ints, faces: Ints) -> Ints:
     """Return the cell whose outward face each of the `faces` is, shape ``(k,)``; −1 where there is none.
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from turgor.common.errors import InputError
 from turgor.common.log import logger
+from turgor.common.rows import row_numbers
 from turgor.mesh.cells import CELLS, Cell, determinants, face_cell, jacobians
 from turgor.mesh.elevate import KINDS, completed
-from turgor.mesh.faces import boundary_faces, connected_faces, places_of_faces
+from turgor.mesh.faces import boundary_faces, connected_faces, crowded_faces, places_of_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import FloatArray, IntArray
 
@@ -57,7 +58,8 @@ def assembled(raw: RawMesh) -> Mesh:
     Raises
     ------
     InputError
-        If there are no cells of a kind that Turgor has, or of several kinds, or the cells make no valid mesh.
+        If there are no cells of a kind that Turgor has, or of several kinds, a cell is there twice, more than two cells
+        share a face, or the cells make no valid mesh.
     """
     kind, cells, body = _body(raw)
     cell = CELLS[KINDS[kind].cell]
@@ -65,6 +67,7 @@ def assembled(raw: RawMesh) -> Mesh:
         LOG.warning("the cells of the file have straight edges; they are taken for %s of second order", cell.name)
     points = _in_space_of(cell, raw.points)
     points, cells = completed(points, cells, KINDS[kind])
+    _check_single(points, cells, cell)
     cells = _right_side_out(points, cells, cell)
     used, inverse = np.unique(cells, return_inverse=True)
     index = np.full(len(points), -1, dtype=np.int32)
@@ -101,6 +104,31 @@ def _in_space_of(cell: Cell, points: FloatArray) -> FloatArray:
     if cell.dimension == 2 and np.ptp(points[:, 2]) > _SNAP * np.ptp(points):
         raise InputError("the plane cells of the file do not lie in the plane of x and y")
     return np.ascontiguousarray(points[:, : cell.dimension])
+
+
+def _check_single(points: FloatArray, cells: IntArray, cell: Cell) -> None:
+    """Refuse cells that fill the same room: their material would count twice, and their faces are no skin."""
+    corners = cells[:, : cell.n_corners]
+    _, first, counts = np.unique(row_numbers(np.sort(corners, axis=1)), return_index=True, return_counts=True)
+    if counts.max() > 1:
+        raise InputError(
+            f"cells are there more than once: {counts.sum() - len(counts)} of {len(cells)}, the first one around "
+            f"{_place(points[corners[first[counts > 1].min()]])}",
+            expected="every cell once (files of gmsh's version 2 repeat those of several physical groups)",
+        )
+    crowded = crowded_faces(cells)
+    if len(crowded):
+        nodes = crowded[0, : face_cell(crowded).n_corners]
+        what = "edges" if cell.dimension == 2 else "faces"
+        raise InputError(
+            f"{what} belong to more than two cells: {len(crowded)}, the first one around {_place(points[nodes])}",
+            expected="cells that do not overlap",
+        )
+
+
+def _place(points: FloatArray) -> str:
+    """Write the middle of some points ``(k, d)`` in the numbers of the file."""
+    return "(" + ", ".join(f"{x:.6g}" for x in points.mean(axis=0)) + ")"
 
 
 def _right_side_out(points: FloatArray, cells: IntArray, cell: Cell) -> IntArray:
