@@ -6,8 +6,9 @@ import pytest
 
 from turgor.common.errors import InputError
 from turgor.geometry.catalogue import actuator, templates
-from turgor.geometry.drawing import Distance, Turn
+from turgor.geometry.drawing import Distance, Pointer, Turn
 from turgor.mesh.drawing import save_drawing
+from turgor.mesh.preview import save_preview
 
 # What is said by the choice of the model, not by a measure.
 CHOICES = {"model", "symmetric"}
@@ -25,7 +26,7 @@ ABSENT = {
     "bellows": {"root_radius"},  # of one fold
     "fibre-tube": {"tilt"},
     "membrane": {"spacing"},
-    "pneunet": {"wall", "gap", "tunnel_roof", "tunnel_height", "second_layer"},
+    "pneunet": {"wall", "gap", "tunnel_roof", "tunnel_height", "tunnel_width", "second_layer"},
 }
 
 
@@ -54,6 +55,37 @@ def test_every_measure_is_as_long_as_it_says(name, changes):
             assert math.dist(mark.start, mark.end) == pytest.approx(getattr(shape, mark.name)), mark.name
         elif isinstance(mark, Turn):
             assert mark.end - mark.start == pytest.approx(getattr(shape, mark.name))
+
+
+@pytest.mark.parametrize("cross_section", ["square", "triangle", "half-round"])
+@pytest.mark.parametrize("chambers", [1, 2, 3, 8])
+def test_what_is_measured_is_seen(chambers, cross_section):
+    finger = actuator("pneunet", chambers=chambers, cross_section=cross_section)
+    for view in finger.views():
+        left, right = view.window[:2] if view.window else (-math.inf, math.inf)
+        for mark in view.marks:
+            ends = [mark.start, mark.end] if isinstance(mark, Distance) else [mark.place]
+            assert all(left <= x <= right for x, _ in ends), mark.name
+
+
+@pytest.mark.parametrize("changes", [{}, *({"columns": n, "plate": "2 mm"} for n in (1, 2, 3)), {"columns": 1}])
+def test_no_arrow_runs_through_a_word(changes):
+    view = actuator("honeycomb", **changes).views()[0]
+    for pointer in (mark for mark in view.marks if isinstance(mark, Pointer)):
+        way = np.array([math.cos(math.radians(pointer.angle)), math.sin(math.radians(pointer.angle))])
+        for place in view.notes.values():
+            along, aside = np.subtract(place, pointer.place) @ np.column_stack([way, [-way[1], way[0]]])
+            assert along < 0 or abs(aside) > 5.0, pointer.name
+
+
+def test_a_preview_shows_the_mesh_of_a_section_too(tmp_path):
+    section = actuator("tube", model="axisymmetric", length="40 mm")
+    save_drawing(section, tmp_path / "drawing.png")
+    save_preview(section, tmp_path / "preview.png")
+    heights = [matplotlib.image.imread(tmp_path / f"{name}.png").shape[0] for name in ("drawing", "preview")]
+    below = matplotlib.image.imread(tmp_path / "preview.png")[heights[0] :, :, :3]
+    assert heights[1] > heights[0] + 700
+    assert (below < 0.98).any(axis=-1).mean() > 0.01
 
 
 @pytest.mark.parametrize("name", ["bellows", "fibre-tube"])

@@ -140,7 +140,7 @@ class Honeycomb(Actuator):
             *((OUTSIDE, along(room)) for room in rooms),
             *((AIR, along(cell)) for cell in cells),
         ]
-        right, height = self.columns * self.cell_width, self.height + self.plate
+        height = self.height + self.plate
         middle = (self.columns // 2 + 0.5) * self.cell_width
         left, end, low, high = self._plate_box()
         plate: Mark = Pointer("plate", (end, height), 45)
@@ -151,7 +151,7 @@ class Honeycomb(Actuator):
             "the network in the plane of x and z",
             areas,
             [
-                Pointer("columns", (right - 0.5 * self.cell_width, height), 90),
+                Pointer("columns", (left, self.height), 135),
                 Pointer("rows", (0.0, 0.5 * (self.thickness + self.cell_height)), 180),
                 plate,
             ],

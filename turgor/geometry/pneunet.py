@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry import cad
-from turgor.geometry.actuator import Actuator, Shape, parameter
+from turgor.geometry.actuator import Actuator, FloatArray, Shape, parameter
 from turgor.geometry.chamber import Chamber, CrossSection
 from turgor.geometry.drawing import AIR, Distance, Mark, Pointer, View, along, rectangle
 from turgor.geometry.path import Piece
@@ -103,33 +104,45 @@ class PneuNet(Actuator):
         """Show the section along the finger, the walls around the first gap, and the section across a chamber."""
         top, length = self._floor + self.chamber_height + self.top_wall, self.length
         starts = list(self._chamber_starts())
-        solid = [("body", np.array(self._profile())), ("base", rectangle(0, length, 0, self.second_layer))]
-        inside = [rectangle(x, x + self.chamber_length, self._floor, self._floor + self.chamber_height) for x in starts]
-        passage = rectangle(starts[0], starts[-1] + self.chamber_length, self._floor, self._floor + self.tunnel_height)
-        areas = [*solid[: 2 if self.second_layer else 1], *((AIR, part) for part in (*inside, passage))]
         first = (starts[0], starts[0] + self.chamber_length)
-        marks: list[Mark] = [
-            Distance("chamber_length", (first[0], top), (first[1], top), 1),
-            Distance("end_wall", (0, 0), (self.end_wall, 0), -1),
-        ]
-        if self.chambers > 1:
-            gap = first[1] + self.wall
-            roof = self._floor + self.tunnel_height
-            marks += [
-                Distance("wall", (first[1], top), (gap, top), 2),
-                Distance("gap", (gap, top), (gap + self.gap, top), 3),
-                Distance("tunnel_roof", (gap, roof), (gap, roof + self.tunnel_roof)),
-                Distance("tunnel_height", (gap + self.gap, self._floor), (gap + self.gap, roof), -4),
-            ]
-        end = min(length, starts[-1] if self.chambers < 3 else starts[1] + self.chamber_length + self.wall)
+        aside = max(0.03 * length, 0.07 * top)
         whole = View(
             "section along the middle plane y = 0, from mount to tip",
-            areas,
+            self._along(),
             [Pointer("chambers", (starts[-1] + 0.5 * self.chamber_length, top), 90)],
-            notes={"mount": (-0.03 * length, 0.5 * top), "tip": (1.02 * length, 0.0)},
+            notes={"mount": (-aside, 0.5 * top), "tip": (length + 0.7 * aside, 0.0)},
         )
-        detail = View("the first chambers, larger", areas, marks, window=(0.0, end, 0.0, top))
+        end_wall = Distance("end_wall", (0, 0), (self.end_wall, 0), -1)
+        if self.chambers == 1:
+            title = f"{whole.title}; one chamber has neither gaps nor a passage"
+            marks = [*whole.marks, end_wall, Distance("chamber_length", (first[0], 0), (first[1], 0), -2)]
+            return [replace(whole, title=title, marks=marks), self._across(top)]
+        gap = first[1] + self.wall
+        roof = self._floor + self.tunnel_height
+        measures = [
+            Distance("chamber_length", (first[0], top), (first[1], top), 1),
+            end_wall,
+            Distance("wall", (first[1], top), (gap, top), 2),
+            Distance("gap", (gap, top), (gap + self.gap, top), 3),
+            Distance("tunnel_roof", (gap, roof), (gap, roof + self.tunnel_roof)),
+            Distance("tunnel_height", (gap + self.gap, self._floor), (gap + self.gap, roof), -4),
+        ]
+        end = min(length, starts[1] + self.chamber_length + self.wall)
+        detail = View("the first chambers, larger", whole.areas, measures, window=(0.0, end, 0.0, top))
         return [whole, detail, self._across(top)]
+
+    def _along(self) -> list[tuple[str, FloatArray]]:
+        """Return the areas of the section along the middle plane."""
+        starts, floor = list(self._chamber_starts()), self._floor
+        areas = [("body", np.array(self._profile()))]
+        if self.second_layer:
+            areas.append(("base", rectangle(0, self.length, 0, self.second_layer)))
+        areas += [(AIR, rectangle(x, x + self.chamber_length, floor, floor + self.chamber_height)) for x in starts]
+        if self.chambers > 1:
+            areas.append(
+                (AIR, rectangle(starts[0], starts[-1] + self.chamber_length, floor, floor + self.tunnel_height))
+            )
+        return areas
 
     def _across(self, top: float) -> View:
         chamber, low, floor = self._chamber, self.second_layer, np.array([0.0, self._floor])
@@ -148,14 +161,17 @@ class PneuNet(Actuator):
             Distance("chamber_height", (-side, self._floor), (-side, ceiling), 1),
             Distance("top_wall", (side, ceiling), (side, top), -1),
             Distance("first_layer", (side, low), (side, self._floor), -1),
-            Distance("tunnel_width", (-width, roof), (width, roof), 1),
             Pointer("cross_section", (-0.5 * side, top) if self.cross_section == "square" else (0.0, top), 90),
             *([Distance("second_layer", (-side, 0.0), (-side, low), 1)] if low else []),
         ]
         areas = [("body", along(chamber.outside(-self.first_layer)) + floor)]
         if low:
             areas.append(("base", rectangle(-side, side, 0.0, low)))
-        areas += [(AIR, along(chamber.inside()) + floor), (AIR, rectangle(-width, width, self._floor, roof))]
+        areas.append((AIR, along(chamber.inside()) + floor))
+        if self.chambers == 1:
+            return View("section across the chamber", areas, marks)
+        areas.append((AIR, rectangle(-width, width, self._floor, roof)))
+        marks.append(Distance("tunnel_width", (-width, roof), (width, roof), 1))
         return View("section across a chamber; the passage behind it", areas, marks)
 
     def draw(self) -> Shape:

@@ -1,4 +1,4 @@
-"""A template at a glance: its dimensioned drawing, and below it the mesh in space."""
+"""A template at a glance: its dimensioned drawing, and below it the mesh."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from turgor.mesh.picture import save_picture
 def save_preview(actuator: Actuator, path: str | Path) -> None:
     """Draw an actuator, mesh it (one half, where there is a plane of symmetry) and save both as one PNG file.
 
-    No screen is needed. Of a plane shape only the drawing is there.
+    No screen is needed.
 
     Raises
     ------
@@ -31,12 +31,10 @@ def save_preview(actuator: Actuator, path: str | Path) -> None:
         raise InputError("a picture is saved as .png", value=str(path))
     if not path.parent.is_dir():
         raise InputError("there is no such folder", value=str(path.parent))
-    picture = None
-    if actuator.section is None:
-        with tempfile.TemporaryDirectory() as folder:
-            image = Path(folder) / "mesh.png"
-            save_picture(generate(_opened(actuator)), image, window=(1430, 800))
-            picture = matplotlib.image.imread(image)
+    with tempfile.TemporaryDirectory() as folder:
+        image = Path(folder) / "mesh.png"
+        save_picture(generate(_opened(actuator)), image, window=(1430, 800))
+        picture = matplotlib.image.imread(image)
     save_drawing(actuator, path, picture)
 
 
