@@ -130,6 +130,13 @@ def test_what_the_mesh_does_not_have_is_refused(mesh: tg.Mesh) -> None:
         tg.CappedTube().mesh(size=3)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("wrong", ["foo", None, 0.05])
+def test_what_is_no_material_is_refused_with_its_region(mesh: tg.Mesh, wrong: object) -> None:
+    found = "'foo'" if wrong == "foo" else type(wrong).__name__
+    with pytest.raises(InputError, match=rf"^body: this is not a material \(found .*{found}.*; expected .*C10"):
+        tg.Model(mesh, body=wrong)  # type: ignore[arg-type]
+
+
 def test_regions_without_a_material_are_made_of_the_body() -> None:
     mesh = tg.PneuNet(chambers=1, symmetric=True).mesh(size="4 mm")
     rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"})

@@ -55,7 +55,8 @@ class Model:
     Raises
     ------
     InputError
-        If a region, surface, cavity or curve is unknown, a region has no material, or a measure is impossible.
+        If a region, surface, cavity or curve is unknown, a region has no material or something else in its place, or a
+        measure is impossible.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class Model:
     ) -> None:
         self.mesh = mesh
         self.materials = every_region(materials, mesh)
+        _check_materials(materials)
         self.setup = Setup.read(
             supports=_default_supports(mesh) if supports is None else supports,
             loads=loads,
@@ -232,6 +234,18 @@ class Model:
             },
             **self.setup.model_dump(mode="json", exclude_none=True),
         }
+
+
+def _check_materials(materials: Mapping[str, object]) -> None:
+    """Refuse what is no material: a name or a report of fits would be asked for its stiffness much later."""
+    for region, material in materials.items():
+        if not isinstance(material, Hyperelastic):
+            raise InputError(
+                "this is not a material",
+                key=region,
+                value=material if isinstance(material, str) else type(material).__name__,
+                expected="one of material('neo-hookean', {'C10': '0.05 MPa'}), find_material(NAME).build, fit(…).best",
+            )
 
 
 def _check_steps(steps: int) -> None:
