@@ -61,6 +61,18 @@ def test_every_length_is_refused_without_unit_negative_or_absurd(name):
                 actuator(name, **{key: value})
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_bounds_of_an_angle_are_those_that_are_enforced(name):
+    for parameter in template(name).parameters():
+        if parameter.default.endswith(" deg"):
+            low, high = (float(end) for end in parameter.bounds.removesuffix(" deg").split(" to "))
+            for angle in (low - 0.1, high + 0.1):
+                with pytest.raises(InputError, match=f"^{parameter.name}: .*expected {parameter.bounds}$"):
+                    actuator(name, **{parameter.name: f"{angle} deg"})
+            for angle in (low, high):
+                actuator(name, **{parameter.name: f"{angle} deg"})
+
+
 def test_text_and_units_are_read():
     finger = PneuNet(chambers=8, wall="1.5 mm", gap="0.1 cm")
     assert (finger.chambers, finger.wall, finger.gap) == (8, 1.5, 1.0)

@@ -95,6 +95,7 @@ class Actuator(BaseModel, ABC):
         except ValidationError as error:
             raise _input_error(error, type(self)) from None
         self._check_scale()
+        self._check_angles()
         self.check()
 
     @classmethod
@@ -114,6 +115,14 @@ class Actuator(BaseModel, ABC):
             if is_length and size != 0.0 and not SMALLEST <= size <= LARGEST:
                 expected = f"{SMALLEST:g} mm to {LARGEST:g} mm"
                 raise InputError("no actuator has this size", key=name, value=f"{size:g} mm", expected=expected)
+
+    def _check_angles(self) -> None:
+        for name, info in type(self).model_fields.items():
+            extra = info.json_schema_extra
+            degrees: Any = extra.get("degrees") if isinstance(extra, dict) else None
+            if degrees and not math.radians(degrees[0]) <= getattr(self, name) <= math.radians(degrees[1]):
+                value = f"{math.degrees(getattr(self, name)):g} deg"
+                raise InputError("no actuator has this angle", key=name, value=value, expected=_range(degrees))
 
     @property
     def per_circle(self) -> int:
@@ -158,7 +167,15 @@ class Actuator(BaseModel, ABC):
         """Add the solid to the current gmsh model and return the names of its parts."""
 
 
-def parameter(default: Any, meaning: str, source: str, *, ge: int | None = None, le: int | None = None) -> Any:
+def parameter(
+    default: Any,
+    meaning: str,
+    source: str,
+    *,
+    ge: int | None = None,
+    le: int | None = None,
+    degrees: tuple[float, float] | None = None,
+) -> Any:
     """Declare a template's parameter.
 
     Parameters
@@ -171,8 +188,11 @@ def parameter(default: Any, meaning: str, source: str, *, ge: int | None = None,
         Where the default comes from.
     ge, le
         Bounds of a whole number.
+    degrees
+        Bounds of an angle, both included.
     """
-    return Field(default=default, description=meaning, json_schema_extra={"source": source}, ge=ge, le=le)
+    extra: dict[str, Any] = {"source": source, **({"degrees": list(degrees)} if degrees else {})}
+    return Field(default=default, description=meaning, json_schema_extra=extra, ge=ge, le=le)
 
 
 _LIMITS = {
@@ -187,6 +207,8 @@ _QUANTITY_BOUNDS = ((PositiveLength, "greater than 0 mm"), (NonNegativeLength, "
 def _describe(name: str, info: FieldInfo, schema: Mapping[str, Any]) -> Parameter:
     limits = [f"{word} {schema[key]}" for key, word in _LIMITS.items() if key in schema]
     limits += [text for kind, text in _QUANTITY_BOUNDS if get_args(kind)[1] in info.metadata]
+    if "degrees" in schema:
+        limits.append(_range(schema["degrees"]))
     if "enum" in schema:
         limits.append("one of: " + ", ".join(schema["enum"]))
     return Parameter(
@@ -196,6 +218,11 @@ def _describe(name: str, info: FieldInfo, schema: Mapping[str, Any]) -> Paramete
         meaning=info.description or "",
         source=str(schema["source"]),
     )
+
+
+def _range(degrees: Sequence[float]) -> str:
+    low, high = degrees
+    return f"{low:g} to {high:g} deg"
 
 
 def _input_error(error: ValidationError, kind: type[Actuator]) -> InputError:

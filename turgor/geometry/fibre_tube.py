@@ -45,7 +45,9 @@ class FibreTube(Actuator):
     fibre_length: PositiveLength = parameter("305 mm", "part of the length that is wound all around", _THESIS)
     fibres: int = parameter(2, "number of fibres", _THESIS, ge=1, le=64)
     pitch: PositiveLength = parameter("15 mm", "rise of a fibre in one turn", "assumed: the thesis prints none")
-    tilt: Angle = parameter("51 deg", "tilt of the helix; 0 is a standard one", f"{_THESIS}: 41, 51 and 61 deg")
+    tilt: Angle = parameter(
+        "51 deg", "tilt of the helix; 0 is a standard one", f"{_THESIS}: 41, 51 and 61 deg", degrees=(0, 75)
+    )
     winding: Literal["left", "right", "both"] = parameter(
         "right", "sense: 'right' turns anticlockwise as it rises, 'both' alternates from fibre to fibre", _ASSUMED
     )
@@ -68,9 +70,6 @@ class FibreTube(Actuator):
         if self.fibre_length > self.length:
             value, expected = f"{self.fibre_length:g} mm", f"at most {self.length:g} mm"
             raise InputError("the fibres are longer than the tube", key="fibre_length", value=value, expected=expected)
-        if not 0.0 <= self.tilt <= math.radians(75):
-            value = f"{math.degrees(self.tilt):g} deg"
-            raise InputError("no fibre stays on the tube at this tilt", key="tilt", value=value, expected="0 to 75 deg")
         if not self._curves():
             value, expected = f"{self.fibre_length:g} mm", "a longer part of the tube"
             raise InputError("no fibre fits on this length", key="fibre_length", value=value, expected=expected)
