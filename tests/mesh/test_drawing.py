@@ -88,6 +88,14 @@ def test_a_preview_shows_the_mesh_of_a_section_too(tmp_path):
     assert (below < 0.98).any(axis=-1).mean() > 0.01
 
 
+def test_a_preview_that_is_too_thin_to_mesh_names_what_can_be_changed(tmp_path):
+    with pytest.raises(
+        InputError, match=r"^the elements of a preview.*found '0.01 mm'.*expected a thicker part"
+    ) as found:
+        save_preview(actuator("tube", wall="0.01 mm"), tmp_path / "tube.png")
+    assert found.value.key is None
+
+
 @pytest.mark.parametrize("name", ["bellows", "fibre-tube"])
 def test_the_drawing_fills_its_picture(name, tmp_path):
     path = tmp_path / f"{name}.png"

@@ -11,6 +11,7 @@ from turgor.common.errors import InputError
 from turgor.geometry.actuator import Actuator
 from turgor.mesh.drawing import save_drawing
 from turgor.mesh.generate import generate
+from turgor.mesh.mesh import Mesh
 from turgor.mesh.picture import save_picture
 
 
@@ -22,7 +23,8 @@ def save_preview(actuator: Actuator, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the path does not end in .png or its folder does not exist, the shape has no drawing or gmsh no valid mesh.
+        If the path does not end in .png or its folder does not exist, the shape has no drawing, is too thin for its
+        size to be meshed, or gmsh finds no valid mesh.
     MissingPackageError
         If gmsh, pyvista or a system library that they load is absent.
     """
@@ -33,9 +35,23 @@ def save_preview(actuator: Actuator, path: str | Path) -> None:
         raise InputError("there is no such folder", value=str(path.parent))
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder) / "mesh.png"
-        save_picture(generate(_opened(actuator)), image, window=(1430, 800))
+        save_picture(_meshed(_opened(actuator)), image, window=(1430, 800))
         picture = matplotlib.image.imread(image)
     save_drawing(actuator, path, picture)
+
+
+def _meshed(actuator: Actuator) -> Mesh:
+    try:
+        return generate(actuator)
+    except InputError as error:
+        if error.key != "size":
+            raise
+        # A preview has no size that one could change.
+        raise InputError(
+            f"the elements of a preview are as small as the thinnest part asks for, and {error.problem}",
+            value=error.value,
+            expected="a thicker part, or a case with a larger mesh.size and the command mesh",
+        ) from error
 
 
 def _opened(actuator: Actuator) -> Actuator:
