@@ -1,3 +1,5 @@
+import re
+
 import meshio
 import numpy as np
 import pytest
@@ -69,6 +71,27 @@ def test_a_cut_off_file_is_refused(mesh, suffix, tmp_path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(InputError, match=f"cut{suffix}: "):
         read(path)
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".vtu"])
+@pytest.mark.parametrize("part", [0.05, 0.3, 0.7, 0.99])
+def test_a_file_that_ends_early_is_told_in_plain_words(mesh, suffix, part, tmp_path):
+    path = tmp_path / f"cut{suffix}"
+    write(mesh, path)
+    path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
+    with pytest.raises(InputError, match=f"cut{suffix}: the file ends early") as found:
+        read(path)
+    assert not re.search("shape|array|index|broadcast", str(found.value))
+
+
+def test_a_file_without_its_middle_is_damaged_in_plain_words(mesh, tmp_path):
+    path = tmp_path / "gap.msh"
+    write(mesh, path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2] + whole[len(whole) // 2 + 1000 :])
+    with pytest.raises(InputError, match=r"gap\.msh: this is not a readable mesh file: it is damaged") as found:
+        read(path)
+    assert not re.search("shape|array|index|broadcast", str(found.value))
 
 
 @pytest.mark.parametrize("suffix", [".msh", ".vtu"])

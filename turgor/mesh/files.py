@@ -9,6 +9,7 @@ elsewhere, by which ParaView can threshold.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,12 @@ _KIND_OF_DIMENSION = {3: "region", 2: "surface", 1: "curve", 0: "marker"}
 
 _OF_MATERIALS = ("gmsh:physical", "region", "regions", "material", "materials", "materialid", "materialids", "part")
 """Cell arrays, in small letters, by which programs tell materials apart."""
+
+_FRAME = {".msh": (b"$", rb"\$End\w+\s*$", "a line $End…"), ".vtu": (b"<", rb"</VTKFile>", "</VTKFile>")}
+"""What a file begins with, what its end holds, and that in words."""
+
+_END_LENGTH = 1000
+"""Bytes that are taken for the end of a file."""
 
 Sets = dict[tuple[str, str], IntArray]
 """Kind and name of each set → nodes of its cells, one row a cell."""
@@ -80,7 +87,7 @@ def read(path: str | Path) -> Mesh:
     Raises
     ------
     InputError
-        If the file is absent, of another kind, damaged, or holds no valid mesh.
+        If the file is absent, of another kind, damaged, cut short, or holds no valid mesh.
     """
     path = Path(path)
     if path.suffix != ".inp":
@@ -92,10 +99,29 @@ def read(path: str | Path) -> Mesh:
     except InputError as error:
         raise error.at(file=path) from error
     except Exception as error:  # parsers fail in as many ways as a file can be damaged
-        raise InputError(f"this is not a readable mesh file: {error}", file=path) from error
+        raise InputError(f"this is not a readable mesh file: {_words(error, path)}", file=path) from error
+
+
+def _words(error: Exception, path: Path) -> str:
+    """Return what a parser says of a file; arrays that do not fit say nothing that a person could use."""
+    says = str(error) if path.suffix == ".inp" or isinstance(error, (meshio.ReadError, SyntaxError)) else ""
+    return says or "it is damaged, its parts do not fit together"
+
+
+def _check_complete(path: Path) -> None:
+    """Refuse a file that begins as its format does and does not end so: half a mesh may be readable, too."""
+    first, last, words = _FRAME[path.suffix]
+    with path.open("rb") as stream:
+        begin = stream.read(_END_LENGTH)
+        stream.seek(max(0, path.stat().st_size - _END_LENGTH))
+        end = stream.read()
+    if begin.lstrip().startswith(first) and not re.search(last, end):
+        problem = "the file ends early: it was not written or copied to its end"
+        raise InputError(problem, expected=f"a file that ends in {words}")
 
 
 def _read_by_meshio(path: Path) -> Mesh:
+    _check_complete(path)
     stored = {".msh": meshio.gmsh, ".vtu": meshio.vtu}[path.suffix].read(path)
     own = [*stored.field_data, *stored.cell_data]
     if any(name.startswith("region:") for name in own):
