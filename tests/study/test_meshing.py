@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import logging
+import re
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
+import yaml
 
 import turgor as tg
+from turgor.mesh.decks import write_deck
+from turgor.mesh.structured import box
 from turgor.study.meshing import checked_mesh
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
@@ -104,3 +108,53 @@ def test_a_name_that_is_not_there_stops_a_run_but_not_a_mesh(tmp_path: Path, cap
         assert words in caplog.text
     with pytest.raises(tg.InputError, match=r"materials\.lid: the actuator has no such region"):
         checked_mesh(tg.load_case(path))
+
+
+def block(folder: Path, suffix: str, length: float) -> Path:
+    """Write a block of three to two to one as an STL or mesh file."""
+    mesh = box((length, length * 2 / 3, length / 3), (1, 1, 1))
+    path = folder / f"block{suffix}"
+    if suffix == ".inp":
+        write_deck(mesh, path)
+        return path
+    facets = [mesh.points[face[:3]] for faces in mesh.surfaces.values() for face in faces]
+    corners = ("".join("vertex {!r} {!r} {!r}\n".format(*map(float, point)) for point in facet) for facet in facets)
+    loops = "".join(f"facet normal 0 0 0\nouter loop\n{three}endloop\nendfacet\n" for three in corners)
+    path.write_text(f"solid body\n{loops}endsolid body\n", encoding="ascii")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("suffix", "length", "unit", "size", "doubt"),
+    [
+        (".stl", 0.03, "mm", "4 mm", r"0.03 × 0.02 × 0.01 mm, smaller than an element of mesh.size, 4 mm,.*'mm'"),
+        (".stl", 0.03, "mm", None, "smaller than actuators are.*'mm'"),
+        (".stl", 30.0, "mm", "4 mm", None),
+        (".stl", 30.0, "m", "4 m", "30000 × 20000 × 10000 mm, larger than actuators are.*'m'"),
+        (".inp", 40.0, "1 m", None, "larger than actuators are.*'1000 mm'"),
+        (".inp", 40.0, "1 um", None, "smaller than actuators are"),
+        (".inp", 0.04, "1 m", None, None),
+    ],
+)
+def test_a_unit_that_makes_no_actuator_is_doubted_once(
+    suffix: str, length: float, unit: str, size: str | None, doubt: str | None, tmp_path: Path, caplog: Any
+) -> None:
+    geometry = {"template": {".stl": "stl", ".inp": "mesh"}[suffix], "unit": unit}
+    geometry["file"] = block(tmp_path, suffix, length).name
+    rules = {"mount": {"normal": [0, 0, -1]}} if suffix == ".stl" else {}
+    case = {"geometry": geometry | rules, **({"mesh": {"size": size}} if size else {})}
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(case), encoding="utf-8")
+    with caplog.at_level(logging.WARNING, "turgor.study"):
+        tg.mesh_case(tg.load_draft(tmp_path / "case.yaml"))
+    said = [record.getMessage() for record in caplog.records if record.name == "turgor.study"]
+    assert len(said) == (doubt is not None)
+    if doubt:
+        assert re.match(f"geometry.unit: the body is .*{doubt}", said[0])
+
+
+def test_a_template_is_not_doubted(tmp_path: Path, caplog: Any) -> None:
+    small = {"template": "tube", "inner_radius": "0.06 mm", "wall": "0.03 mm", "length": "0.4 mm", "cap": "0.1 mm"}
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump({"geometry": small}), encoding="utf-8")
+    with caplog.at_level(logging.WARNING, "turgor.study"):
+        tg.mesh_case(tg.load_draft(tmp_path / "case.yaml"))
+    assert not caplog.records

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from turgor.common.errors import InputError
 from turgor.common.log import logger
 from turgor.geometry.imported.mesh_file import MeshFile
+from turgor.geometry.imported.solid import ImportedSolid
 from turgor.geometry.imported.surface import BrokenSurfaceError
 from turgor.mesh import Mesh
 from turgor.mesh.generate import generate
@@ -18,6 +21,10 @@ from turgor.study.case import Case, Draft, MeshCase
 from turgor.study.validation import under
 
 log = logger("study")
+
+USUAL_EXTENT = (1.0, 5000.0)
+"""Largest extent in mm of the actuators that people make, from a valve on a chip to an arm; a slip of the unit, which
+few files tell, leads out of it."""
 
 
 def mesh_case(case: Draft, picture: str | Path | None = None) -> Mesh:
@@ -84,8 +91,25 @@ def _divided(case: Draft) -> Mesh:
         if field in MeshCase.model_fields:
             raise under(error, "mesh") from error
         raise (under(error, "geometry") if field in type(case.geometry).model_fields else error) from error
+    if isinstance(case.geometry, (ImportedSolid, MeshFile)):
+        _doubt_unit(case, mesh)
     if case.regions:
         spaces = {name: region.where for name, region in case.regions.items()}
         least = {name: region.at_least for name, region in case.regions.items()}
         mesh = partition(mesh, spaces, at_least=least)
     return mesh
+
+
+def _doubt_unit(case: Draft, mesh: Mesh) -> None:
+    """Warn where a body from a file is so small or large that its unit is likely to be another one."""
+    extent = np.ptp(mesh.points, axis=0)
+    largest, size = float(extent.max()), case.mesh.size
+    if size is not None and largest < size:
+        doubt = f"smaller than an element of mesh.size, {size:g} mm, in all directions"
+    elif not USUAL_EXTENT[0] <= largest <= USUAL_EXTENT[1]:
+        doubt = f"{'smaller' if largest < USUAL_EXTENT[0] else 'larger'} than actuators are"
+    else:
+        return
+    unit = case.geometry.model_dump(mode="json").get("unit")
+    key, check = ("unit", f"is '{unit}' its unit?") if unit else ("file", "check the unit of the file")
+    log.warning("geometry.%s: the body is %s mm, %s; %s", key, " × ".join(f"{x:.5g}" for x in extent), doubt, check)
