@@ -16,6 +16,7 @@ from turgor.mesh import Mesh
 from turgor.study.boundary import GravityCase, Load, PressureCase, Support
 from turgor.study.contact import ContactChoice
 from turgor.study.reinforcement import FibreCase, FibreFamilyCase, SheetCase
+from turgor.study.rest import check_rest
 from turgor.study.validation import StrictModel, explain, suggestion
 
 
@@ -71,10 +72,10 @@ class Setup(StrictModel):
         Raises
         ------
         InputError
-            As :meth:`check` and :class:`System` do.
+            As :meth:`check`, :class:`System` and :func:`turgor.study.rest.check_rest` do.
         """
         self.check(mesh)
-        return System(
+        system = System(
             mesh,
             materials,
             supports=[support.build() for support in self.supports],
@@ -83,6 +84,9 @@ class Setup(StrictModel):
             section=section,
             contact=self.contact.build() if self.contact else [],
         )
+        if self.contact:
+            check_rest(self.contact, system)
+        return system
 
     @property
     def held(self) -> tuple[str, ...]:
