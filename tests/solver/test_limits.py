@@ -82,6 +82,32 @@ def test_the_arc_sets_out_from_any_state_of_the_path(full):
             assert end.fraction == pytest.approx(whole[-1].fraction, rel=1e-5)
 
 
+@pytest.mark.parametrize(("full", "largest"), [(5e-5, 0.2), (2e-4, 0.07)])
+def test_an_arc_goes_on_behind_a_turn_of_the_volume_as_if_it_had_not_stopped(full, largest):
+    def walk(**past):
+        system = arch(full, rise=1.5, depth=3.0)
+        target = volumes(system, 17.1887, 1)[-1]
+        found = follow_arc(system, Volume(ONE), target, 0.2, options=PathOptions(largest_step=largest), **past)
+        return found, [system.conjugate(e.state, ONE) for e in found]
+
+    whole, places = walk()
+    passable = [k for k, e in enumerate(whole) if e.event is None]
+    back = [k for k in passable[1:-1] if places[k + 1] < places[k]]
+    assert len(back) > 3
+    for k in (back[0], back[len(back) // 2], back[-1]):
+        # As they are taken up from the disk: without what the walk knew there.
+        before, start = (
+            Equilibrium(e.state, e.fraction, e.residuals, 0, None)
+            for e in (whole[max(j for j in passable if j < k)], whole[k])
+        )
+        found, volume = walk(start=start, before=before)
+        assert volume[-1] == pytest.approx(places[-1], rel=1e-6)
+        assert found[-1].fraction == pytest.approx(whole[-1].fraction, rel=1e-6)
+        assert events(found) == [(event, pytest.approx(p, rel=1e-5)) for event, p in events(whole[k + 1 :])]
+        if largest == 0.2:  # every state of the walk is delivered, and known where it is taken up
+            assert volume == pytest.approx(places[k + 1 :], rel=1e-6)
+
+
 @pytest.mark.parametrize("steps", [1, 4, 20])
 def test_where_the_volume_turns_back_no_step_lands_on_another_branch_unnoticed(steps):
     system = arch(1.0, rise=1.5)

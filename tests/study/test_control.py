@@ -17,7 +17,9 @@ from turgor.fem.cavity import Cavity
 from turgor.fem.loads import Gravity, Pressure
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
-from turgor.mesh.structured import shell_octant
+from turgor.mesh.decks import write_deck
+from turgor.mesh.mesh import Mesh
+from turgor.mesh.structured import box, shell_octant
 from turgor.results import plots
 from turgor.results.store import RunStore
 from turgor.solver.newton import Equilibrium
@@ -25,6 +27,7 @@ from turgor.solver.path import PathOptions
 from turgor.study.case import load_case
 from turgor.study.control import VolumeControl
 from turgor.study.course import course_by
+from turgor.study.progress import Silent
 from turgor.study.run import Run, run
 from turgor.study.states import Recorder
 
@@ -102,6 +105,75 @@ def test_arc_length_meets_the_same_limit(small_tube: Path) -> None:
     assert rows[-1]["fraction"] == "1.0"
     assert done.summary["final"]["cavity_volume_mm3"] == pytest.approx(4.0 * rest_volume(done), rel=1e-5)
     assert done.summary["events"][0]["pressure_kPa"] == pytest.approx(LIMIT, rel=1e-4)
+
+
+class Until(Silent):
+    """Interrupts a run at a state."""
+
+    def __init__(self, states: int) -> None:
+        self.left = states
+
+    def advance(self, fraction: float, text: str) -> None:
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The case file of an arch that snaps over a shallow cavity: along its path the volume turns back at state 5."""
+    block = box((10.0, 0.4, 1.0), (8, 1, 1), "tet10")
+    points = block.points.copy()
+    points[:, 1] += -3.0 + 1.5 * np.sin(np.pi * points[:, 0] / 20.0)
+    surfaces = {"cavity" if name == "y1" else name: faces for name, faces in block.surfaces.items()}
+    folder = tmp_path_factory.mktemp("turning")
+    write_deck(Mesh(points, block.cells, regions=block.regions, surfaces=surfaces), folder / "arch.inp")
+    (folder / "arch.yaml").write_text(
+        """
+geometry: {template: mesh, file: arch.inp, unit: 1 mm}
+materials: {body: {model: neo-hookean, constants: {C10: 0.5 MPa}, bulk_modulus: 1000 MPa}}
+supports:
+  - {type: clamped, surface: x0}
+  - {type: sliding, surface: x1}
+  - {type: sliding, surface: z0}
+  - {type: sliding, surface: z1}
+loads: [{type: pressure, cavity: cavity, value: 0.2 kPa}]
+control: {type: arc-length, target: 190 %}
+solver: {steps: 3}
+measures: []
+""",
+        encoding="utf-8",
+    )
+    return folder / "arch.yaml"
+
+
+def cut_and_resumed(case: Path, kept: int, states: int) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
+    """Return the first states of a run, and the same where it was killed behind `kept` of them and resumed."""
+    folder, rows = case.parent / "run", []
+    with pytest.raises(KeyboardInterrupt):
+        run(load_case(case), folder, overwrite=True, progress=Until(states))
+    for resumed in (False, True):
+        if resumed:
+            for step in range(kept, states):
+                for end in ("npz", "vtu"):
+                    (folder / "steps" / f"{step:04d}.{end}").unlink()
+            with pytest.raises(KeyboardInterrupt):
+                run(load_case(case), folder, resume=True, progress=Until(states - kept))
+        with (folder / "history.csv").open(encoding="utf-8") as stream:
+            rows.append(list(csv.DictReader(stream)))
+    return rows[0], rows[1]
+
+
+@pytest.mark.parametrize("kept", [7, 8])
+def test_an_arc_that_was_cut_behind_a_turn_of_the_volume_goes_on(turning: Path, kept: int) -> None:
+    # the minimum of the pressure is the last state that is kept, or the one before
+    whole, resumed = cut_and_resumed(turning, kept, 11)
+    volume = column(whole, "cavity_volume_mm3")
+    assert volume[5] > volume[6] > volume[7] > volume[8]
+    assert [row["event"] for row in whole[6:9]] == ["", "pressure-minimum", ""]
+    assert [row["event"] for row in resumed] == [row["event"] for row in whole]
+    assert column(resumed, "cavity_volume_mm3") == pytest.approx(volume, rel=1e-6)
+    assert column(resumed, "pressure_kPa") == pytest.approx(column(whole, "pressure_kPa"), abs=1e-6)
 
 
 def test_a_programme_goes_up_and_down(small_tube: Path) -> None:

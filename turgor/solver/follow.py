@@ -118,6 +118,7 @@ def follow_arc(
     *,
     options: PathOptions | None = None,
     start: Equilibrium | None = None,
+    before: Equilibrium | None = None,
     on_equilibrium: OnEquilibrium | None = None,
     on_progress: OnProgress | None = None,
 ) -> list[Equilibrium]:
@@ -134,6 +135,9 @@ def follow_arc(
     length
         Distance between the states delivered, in the plane of volume and load fraction; along the first the way from
         rest to the target counts as one. Steps are shorter where `options` bounds them to less of that way.
+    before
+        The equilibrium that was delivered before `start`: the path goes on as from there to `start`. Left out, it sets
+        out towards the target, which is back the way it came where the volume has turned.
 
     Returns
     -------
@@ -155,7 +159,7 @@ def follow_arc(
     if start is None and system.loading.acts_at_start:
         post.send(walk.here)
     parts = math.ceil(length / options.largest_step)
-    arc = _Arc(walk, sign, scale, length / parts)
+    arc = _Arc(walk, sign, scale, length / parts, before)
     taken = 0
     with _telling_why(walk, post):
         while sign * (target - walk.measure(walk.here)) > _rounding(target):
@@ -177,8 +181,10 @@ def follow_arc(
                 walk.stand_at(found, previous)
             if flat or not turns:
                 post.send_bifurcation(previous, found)
-            taken += 1
-            if taken % parts == 0:
+            # Behind a state that was delivered the count begins anew, as it does where a run is taken up there.
+            taken = 0 if post.last is found else taken + 1
+            if taken == parts:
+                taken = 0
                 post.send_once(walk.here)
         post.send_once(walk.here)
     return post.sent
@@ -200,13 +206,17 @@ def _cut(walk: VolumeWalk, beyond: Equilibrium, target: float) -> Equilibrium:
 class _Arc:
     """Steps of a given length in the plane of volume and load fraction, each in the direction of the last one."""
 
-    def __init__(self, walk: VolumeWalk, sign: float, scale: float, length: float) -> None:
+    def __init__(
+        self, walk: VolumeWalk, sign: float, scale: float, length: float, before: Equilibrium | None = None
+    ) -> None:
         self.walk, self.scale, self.length = walk, scale, length
         here = walk.here
         assert here.compliance is not None
-        # From rest the path sets out along the tangent, dQ/df being the compliance.
+        # The path sets out along the tangent, dQ/df being the compliance.
         way = np.array([here.compliance / scale, 1.0])
-        self.direction = sign * np.sign(way[0]) * way / np.linalg.norm(way)
+        ahead = sign * np.sign(way[0]) if before is None else walk.heading(before)
+        self.direction = ahead * way / np.linalg.norm(way)
+        walk.stand_at(here, before)
 
     def advance_to(self, target: float, sign: float) -> Equilibrium | None:
         """Return the next state, that at a volume where a step would pass it; ``None`` where even short steps fail."""

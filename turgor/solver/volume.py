@@ -300,6 +300,17 @@ class VolumeWalk:
         found = compliance(self.system, self.linear, state, weights, self.line.growth)
         return replace(equilibrium, compliance=found, negative_pivots=self.linear.inertia())
 
+    def heading(self, before: Equilibrium) -> float:
+        """Return the sign with which the load fraction changes on the way on, come from the equilibrium `before`.
+
+        That of the displacement since then along du/df (Feng, Perić and Owen 1996): it goes on where load or volume
+        turn.
+        """
+        factorise_tangent(self.system, self.linear, self.here.state)
+        force = self.system.free_part(self.system.load_direction(self.here.state, self.line.growth))
+        tangent = self.system.nodal(-self.linear.solve(force))
+        return float(np.sign(np.vdot(tangent, self.here.state.u - before.state.u)))
+
     def is_stable(self, equilibrium: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
         return stable_while_held(self.system, self.quantity, equilibrium)

@@ -28,8 +28,14 @@ SAME = 1e-6
 class Course(Protocol):
     """From rest to the target."""
 
-    def walk(self, start: Equilibrium | None, on_equilibrium: OnEquilibrium, on_progress: OnProgress | None) -> None:
-        """Find the states, from `start` on; raises what the solver raises."""
+    def walk(
+        self,
+        start: Equilibrium | None,
+        on_equilibrium: OnEquilibrium,
+        on_progress: OnProgress | None,
+        before: Equilibrium | None = None,
+    ) -> None:
+        """Find the states, from `start` on, which came behind `before`; raises what the solver raises."""
         ...
 
     def parameter(self, state: Equilibrium) -> float:
@@ -55,8 +61,15 @@ class LoadCourse:
     options: PathOptions
     duration: float | None = None
 
-    def walk(self, start: Equilibrium | None, on_equilibrium: OnEquilibrium, on_progress: OnProgress | None) -> None:
-        """See :class:`Course`."""
+    def walk(
+        self,
+        start: Equilibrium | None,
+        on_equilibrium: OnEquilibrium,
+        on_progress: OnProgress | None,
+        before: Equilibrium | None = None,
+    ) -> None:
+        """See :class:`Course`; the loads tell the way themselves."""
+        del before
         solve_path(
             self.system,
             self.fractions,
@@ -90,8 +103,14 @@ class QuantityCourse:
     length: float | None = None
     duration: None = None
 
-    def walk(self, start: Equilibrium | None, on_equilibrium: OnEquilibrium, on_progress: OnProgress | None) -> None:
-        """See :class:`Course`."""
+    def walk(
+        self,
+        start: Equilibrium | None,
+        on_equilibrium: OnEquilibrium,
+        on_progress: OnProgress | None,
+        before: Equilibrium | None = None,
+    ) -> None:
+        """See :class:`Course`; `before` tells the way along an arc, which a volume tells itself."""
         if self.length is None:
             follow(
                 self.system,
@@ -111,6 +130,7 @@ class QuantityCourse:
             self.length,
             options=self.options,
             start=start,
+            before=before,
             on_equilibrium=on_equilibrium,
             on_progress=on_progress,
         )

@@ -190,14 +190,12 @@ class _Running:
 
     def _walk(self, system: System, course: Course, store: RunStore) -> SolverError | None:
         """Follow the path; return what stopped it short, or ``None`` if it reached the end."""
-        last, known = store.last(), list[StepRecord]()
-        while last and last.solver["event"] in (Event.LIMIT, Event.MINIMUM):
-            # The path cannot be taken up at a limit, where it has no direction: from before, the limit is met again.
-            known.insert(0, last)
-            last = store.load(last.index - 1) if last.index else None
+        last = _passable(store, store.n_steps)
+        before = _passable(store, last.index) if last else None
+        known = [store.load(index) for index in range(last.index + 1 if last else 0, store.n_steps)]
         if last and last.fraction >= 1.0 and not known:
             return None
-        start = to_equilibrium(system, last) if last else None
+        start, earlier = (to_equilibrium(system, record) if record else None for record in (last, before))
         self.show.stage("load")
         recorder = Recorder(system, store.n_steps, course)
 
@@ -208,7 +206,7 @@ class _Running:
                 self._keep(recorder, store, equilibrium)
 
         try:
-            course.walk(start, keep, self._tell)
+            course.walk(start, keep, self._tell, earlier)
         except SolverError as error:
             log.error("%s %s", error, error.facts)
             return error
@@ -272,6 +270,15 @@ class _Running:
         )
         last = store.last()
         return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})
+
+
+def _passable(store: RunStore, behind: int) -> StepRecord | None:
+    """Return the last record before the step `behind` at which the path can be taken up.
+
+    At a limit it has no direction; from before, the limit is met again.
+    """
+    before = (store.load(index) for index in reversed(range(behind)))
+    return next((record for record in before if record.solver["event"] not in (Event.LIMIT, Event.MINIMUM)), None)
 
 
 def _is_same(found: Equilibrium, known: StepRecord) -> bool:
