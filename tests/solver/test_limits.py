@@ -16,11 +16,13 @@ from turgor.fem.rigid import Plane
 from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Clamped, Sliding
 from turgor.fem.system import System
+from turgor.materials.models.gent import Gent
+from turgor.materials.volumetric import Quadratic
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, quarter_ring, rectangle, shell_octant
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import ATMOSPHERE, Air, Volume
-from turgor.solver.events import Event
+from turgor.solver.events import Event, Outcome
 from turgor.solver.follow import follow, follow_arc
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError
 from turgor.solver.path import LimitPressureError, PathOptions, StoppedShortError, output_fractions, solve_path
@@ -120,8 +122,32 @@ def test_where_the_volume_turns_back_no_step_lands_on_another_branch_unnoticed(s
 
 def test_an_arc_that_leads_back_ends():
     system = arch(4e-4, rise=1.5)
-    with pytest.raises(StoppedShortError, match="leads back past where it began"):
-        follow_arc(system, Volume(ONE), volumes(system, 20.0, 1)[-1], 0.2)
+    found: list[Equilibrium] = []
+    target = volumes(system, 20.0, 1)[-1]
+    with pytest.raises(StoppedShortError, match="leads back past where it began") as stopped:
+        follow_arc(system, Volume(ONE), target, 0.2, on_equilibrium=found.append)
+    assert stopped.value.outcome is Outcome.OUT_OF_REACH
+    assert stopped.value.facts["part_of_the_way"] == pytest.approx(
+        (system.conjugate(found[-1].state, ONE) - target) / 20.0 + 1.0
+    )
+
+
+def test_an_arc_ends_where_the_material_locks(monkeypatch):
+    monkeypatch.setattr("turgor.solver.follow.LARGEST_LOAD", 10.0)
+    # Gent's rubber has a largest stretch: the pressure grows without end before forty times the volume.
+    rubber = Gent(mu=0.1, Jm=5.0, volumetric=Quadratic(100.0))
+    body = quarter_ring(1.0, 1.5, 1)
+    system = System(body, {"body": rubber}, [Sliding("y0")], [Pressure("inner", 0.02)], section=Axisymmetric())
+    target = 40.0 * system.conjugate(system.reference_state(), ONE)
+    found: list[Equilibrium] = []
+    with pytest.raises(StoppedShortError, match=r"out of reach: at .* kPa in inner the loads are 10 times") as stopped:
+        follow_arc(system, Volume(ONE), target, 0.1, on_equilibrium=found.append)
+    assert (stopped.value.exit_code, stopped.value.outcome) == (3, Outcome.OUT_OF_REACH)
+    assert found[-1].fraction == stopped.value.facts["last_fraction"] > 10.0
+    assert len(found) < 120
+    # taken up there, it ends there again
+    with pytest.raises(StoppedShortError, match="out of reach"):
+        follow_arc(system, Volume(ONE), target, 0.1, start=found[-1], before=found[-2], on_equilibrium=pytest.fail)
 
 
 @pytest.mark.parametrize("steps", [1, 10])

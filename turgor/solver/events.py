@@ -24,4 +24,5 @@ class Outcome(StrEnum):
     CREASE = "surface-creased"
     MESH = "mesh-distorted"
     CONTACT = "contact"
+    OUT_OF_REACH = "out-of-reach"
     UNEXPLAINED = "not-converged"

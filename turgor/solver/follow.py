@@ -23,7 +23,7 @@ from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, 
 from turgor.solver.path import PathOptions
 from turgor.solver.prediction import predicted
 from turgor.solver.stiffness import StiffnessSolver
-from turgor.solver.stops import ALONG_THE_ARC, stopped
+from turgor.solver.stops import ALONG_THE_ARC, out_of_reach, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.volume import LimitPoint, VolumeWalk
 
@@ -34,6 +34,13 @@ OnProgress = Callable[[float, int, float], None]
 
 FIRST_STEP = 0.3
 """First step of a walk from rest, in parts of what the quantity is there."""
+
+LARGEST_LOAD = 100.0
+"""Load fraction beyond which an arc is given up: the material locks, or is sucked empty, and its volume hardly changes.
+
+By the place on the path and not by the number of states, so that a run that is taken up ends there, too. Far above
+one, as the loads of a case, where the arc has its unit from, need not be near those of the target.
+"""
 
 
 @dense_products_on_one_thread()
@@ -163,12 +170,15 @@ def follow_arc(
     taken = 0
     with _telling_why(walk, post):
         while sign * (target - walk.measure(walk.here)) > _rounding(target):
+            part = (walk.measure(walk.here) - rest) / (target - rest)
+            if part < -1.0:
+                raise out_of_reach(system, walk.here, part, "the path leads back past where it began")
+            if abs(walk.here.fraction) > LARGEST_LOAD:
+                raise out_of_reach(system, walk.here, part, f"the loads are {LARGEST_LOAD:g} times what they are given")
             previous = walk.here
             found = arc.advance_to(target, sign)
             if found is None:
                 raise _nowhere(walk)
-            if sign * (walk.measure(found) - rest) < -scale:
-                raise NotConvergedError("the path leads back past where it began")
             post.tally.count(found)
             if on_progress is not None:
                 on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])

@@ -101,6 +101,22 @@ def stopped(
     )
 
 
+def out_of_reach(system: System, here: Equilibrium, part: float, why: str) -> StoppedShortError:
+    """Return the error for a path that is followed no further, though it goes on behind `here`.
+
+    `part` is how much of the way from rest to the volume asked for it has come.
+    """
+    facts = load_facts(system, here)
+    return StoppedShortError(
+        f"the volume asked for is out of reach: at {load_text(facts)} {why}, with the volume {100.0 * part:.3g} % of "
+        "the way to it",
+        advice="Ask for a volume that the path reaches (control.target); along it the loads' values count as one, and "
+        "with larger ones it is followed further",
+        facts=facts | {"part_of_the_way": part},
+        outcome=Outcome.OUT_OF_REACH,
+    )
+
+
 def at_limit(
     system: System, limit: LimitPoint, why_not_further: str = "", details: Facts | None = None
 ) -> StoppedShortError:
