@@ -309,6 +309,40 @@ def test_a_given_amount_of_air_takes_few_steps_whatever_the_size_and_the_sign_of
     assert len(told) < 15
 
 
+@pytest.mark.parametrize("full", [3e-4, -1e-3])
+@pytest.mark.parametrize("steps", [12, 20])
+def test_an_amount_of_air_that_has_a_maximum_is_told_by_it(full, steps):
+    # Of soft air, at a hundredth of the pressure outside: a roomy cavity of it pushes the arch through.
+    system, soft = arch(full, rise=0.9), 1e-3
+    air = Air(full, soft, full * ONE)
+
+    def amount(equilibrium: Equilibrium) -> float:
+        return air.value(system.conjugate(equilibrium.state, air.weights), equilibrium.fraction)
+
+    rest = system.conjugate(system.reference_state(), ONE)
+    by_volume = [amount(e) for e in follow(system, Volume(ONE), volumes(system, 5.0, 100))]
+    maximum = by_volume[int(np.argmax(np.array(by_volume[1:]) < by_volume[:-1]))]
+    assert maximum == pytest.approx(1.0825 * soft * rest, rel=1e-4)
+    found: list[Equilibrium] = []
+    targets = [soft * rest * float(times) for times in np.linspace(1.0, 1.17, steps + 1)[1:]]
+    with pytest.raises(StoppedShortError, match=r"maximum of 108\.2 % .* while the air is held") as stopped:
+        follow(system, air, targets, on_equilibrium=found.append)
+    assert stopped.value.outcome is Outcome.AIR_LIMIT
+    assert "volume" in stopped.value.advice
+    limit = found[-1]
+    assert limit.event is Event.AIR_LIMIT
+    assert amount(limit) == pytest.approx(maximum, rel=1e-4)
+    assert stopped.value.facts["air_at_limit_mm3"] == pytest.approx(amount(limit) / soft)
+    # what gives way is the middle of the arch, most of all
+    assert system.mesh.points[np.argmax(np.abs(limit.mode).max(axis=1)), 0] == pytest.approx(10.0)
+    # taken up from the state before, it ends there again
+    again: list[Equilibrium] = []
+    with pytest.raises(StoppedShortError, match="while the air is held"):
+        follow(system, air, targets, start=found[-2], on_equilibrium=again.append)
+    assert amount(again[-1]) == pytest.approx(amount(limit), rel=1e-6)
+    assert again[-1].fraction == pytest.approx(limit.fraction, rel=1e-4)
+
+
 @pytest.mark.parametrize("along", ["volume", "arc"])
 def test_steps_are_not_longer_than_is_allowed(along):
     system = arch(1e-3)

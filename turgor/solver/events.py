@@ -10,6 +10,7 @@ class Event(StrEnum):
 
     LIMIT = "limit-pressure"
     MINIMUM = "pressure-minimum"
+    AIR_LIMIT = "air-limit"
     BIFURCATION = "bifurcation"
     POST_SNAP = "post-snap"
 
@@ -19,6 +20,7 @@ class Outcome(StrEnum):
 
     REACHED = "target-reached"
     LIMIT = "limit-pressure"
+    AIR_LIMIT = "air-limit"
     BIFURCATION = "bifurcation"
     MATERIAL = "material-unstable"
     CREASE = "surface-creased"

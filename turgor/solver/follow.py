@@ -15,9 +15,10 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.air import at_limit_of_air, limit_of_air
 from turgor.solver.apart import kept_apart
 from turgor.solver.choice import make_stiffness_solver
-from turgor.solver.control import AlongTangent, ArcLength, Control, Quantity, Volume
+from turgor.solver.control import Air, AlongTangent, ArcLength, Control, Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.path import PathOptions
@@ -97,7 +98,7 @@ def follow(
     post = _Post(walk, on_equilibrium)
     if start is None and system.loading.acts_at_start:
         post.send(walk.here)
-    with _telling_why(walk, post, ALONG_THE_ARC if isinstance(quantity, Volume) else None):
+    with _telling_why(walk, post, ALONG_THE_ARC if isinstance(quantity, Volume) else None, targets[-1]):
         for target in targets:
             while sign * (target - walk.measure(walk.here)) > _rounding(target):
                 previous = walk.here
@@ -392,12 +393,17 @@ def _nowhere(walk: VolumeWalk) -> NotConvergedError:
 
 
 @contextlib.contextmanager
-def _telling_why(walk: VolumeWalk, post: _Post, instead: str | None = None) -> Iterator[None]:
+def _telling_why(walk: VolumeWalk, post: _Post, instead: str | None = None, target: float = math.nan) -> Iterator[None]:
     """Where the solver stops, hand out the last equilibrium found; say why there is none beyond, and what `instead`."""
     try:
         yield
     except SolverError as error:
+        if not isinstance(error, NotConvergedError):
+            post.send_once(walk.here)
+            raise
+        air = walk.quantity if isinstance(walk.quantity, Air) else None
+        if air is not None and (limit := limit_of_air(walk, target)) is not None:
+            post.send(limit)
+            raise at_limit_of_air(walk, air, limit, target) from error
         post.send_once(walk.here)
-        if isinstance(error, NotConvergedError):
-            raise stopped(walk.system, walk.here, error, instead=instead) from error
-        raise
+        raise stopped(walk.system, walk.here, error, instead=instead) from error

@@ -7,7 +7,7 @@ pressure passes its maximum. The load fraction is then an unknown.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -241,18 +241,36 @@ class VolumeWalk:
     def limit_between(self, first: Equilibrium, second: Equilibrium, tolerance: float = 1e-6) -> LimitPoint:
         """Return the limit point between the last two equilibria of the walk, whose compliances differ in sign.
 
-        The load fraction is stationary where its slope by the conjugate, the inverse of the compliance, vanishes; the
-        secant of the slopes finds the place, safeguarded by halving. Each state is predicted from the two that enclose
-        it and the one next to them.
-
         Raises
         ------
         NotConvergedError
             If the limit cannot be located, or the two lie on different branches; the walk stands at `second` again.
         """
-        ends = [(self.measure(e), 1.0 / _compliance(e), e) for e in (first, second)]
+        best, change = self.stationary_between(first, second, _fraction, _slope_of_load, tolerance)
+        return LimitPoint(best, self._is_largest(best, change), self.softest_mode(best))
+
+    def stationary_between(
+        self,
+        first: Equilibrium,
+        second: Equilibrium,
+        value: Callable[[Equilibrium], float],
+        slope_at: Callable[[Equilibrium], float],
+        tolerance: float = 1e-6,
+    ) -> tuple[Equilibrium, float]:
+        """Return the state between the last two equilibria of the walk in which a value is stationary along the path.
+
+        There its slope by the conjugate vanishes (of the load fraction it is the inverse of the compliance); the
+        secant of the slopes finds the place, safeguarded by halving. Each state is predicted from the two that enclose
+        it and the one next to them. The number says with its sign how the value has changed on the way to it.
+
+        Raises
+        ------
+        NotConvergedError
+            If the state cannot be located, or the two lie on different branches; the walk stands at `second` again.
+        """
+        ends = [(self.measure(e), slope_at(e), e) for e in (first, second)]
         span = self._conjugate(second) - self._conjugate(first)
-        best = max(ends, key=lambda end: end[2].fraction * np.sign(ends[0][1] * span))[2]
+        best = max(ends, key=lambda end: value(end[2]) * np.sign(ends[0][1] * span))[2]
         third = self._earlier
         nearer, slope = 1.0, np.inf
         for _ in range(30):
@@ -272,16 +290,16 @@ class VolumeWalk:
                     raise NotConvergedError(reason, facts=error.facts) from error
                 continue
             nearer = 1.0
-            slope = 1.0 / _compliance(best)
+            slope = slope_at(best)
             dropped = 0 if slope * s0 > 0 else 1
             third = ends[dropped][2]
             ends[dropped] = (aim, slope, best)
-            if abs(slope * span) <= tolerance * abs(best.fraction):
+            if abs(slope * span) <= tolerance * abs(value(best)):
                 break
-        if abs(slope * span) > STEEP * abs(best.fraction):
+        if abs(slope * span) > STEEP * abs(value(best)):
             self.stand_at(second, first)
             raise NotConvergedError(f"the path jumps near {best.fraction:.4g} of the load, where a limit was expected")
-        return LimitPoint(best, self._is_largest(best, ends[0][1] * span), self.softest_mode(best))
+        return best, ends[0][1] * span
 
     def _is_largest(self, limit: Equilibrium, change: float) -> bool:
         """Whether the leading load is largest in size at a limit, to which the load fraction has come by a `change`."""
@@ -306,10 +324,17 @@ class VolumeWalk:
         That of the displacement since then along du/df (Feng, Perić and Owen 1996): it goes on where load or volume
         turn.
         """
-        factorise_tangent(self.system, self.linear, self.here.state)
-        force = self.system.free_part(self.system.load_direction(self.here.state, self.line.growth))
-        tangent = self.system.nodal(-self.linear.solve(force))
-        return float(np.sign(np.vdot(tangent, self.here.state.u - before.state.u)))
+        return float(np.sign(np.vdot(self._tangent(self.here), self.here.state.u - before.state.u)))
+
+    def tangent_mode(self, equilibrium: Equilibrium) -> Floats:
+        """Return the displacement along the path at an equilibrium, ``(n_points, d)``, largest component one."""
+        return _scaled(self._tangent(equilibrium))
+
+    def _tangent(self, equilibrium: Equilibrium) -> Floats:
+        """Return du/df along the path, ``(n_points, d)``."""
+        factorise_tangent(self.system, self.linear, equilibrium.state)
+        force = self.system.free_part(self.system.load_direction(equilibrium.state, self.line.growth))
+        return self.system.nodal(-self.linear.solve(force))
 
     def is_stable(self, equilibrium: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
@@ -384,9 +409,27 @@ def softest_mode(system: System, linear: StiffnessSolver, state: State, growth: 
     for _ in range(INVERSE_ITERATIONS):
         vector = linear.solve(vector)
         vector /= np.linalg.norm(vector)
-    mode = system.nodal(vector)
-    largest = mode.ravel()[np.argmax(np.abs(mode))]
-    return np.asarray(mode / largest)
+    return _scaled(system.nodal(vector))
+
+
+def slope_of(quantity: Quantity, system: System, equilibrium: Equilibrium) -> float:
+    """Return the derivative of a quantity by its conjugate along the path: zero at a limit of it."""
+    conjugate, fraction = system.conjugate(equilibrium.state, quantity.weights), equilibrium.fraction
+    control = quantity.fixed(quantity.value(conjugate, fraction))
+    _, by_conjugate, by_fraction = control.gap(conjugate, fraction)
+    return by_conjugate + by_fraction * _slope_of_load(equilibrium)
+
+
+def _scaled(mode: Floats) -> Floats:
+    return np.asarray(mode / mode.ravel()[np.argmax(np.abs(mode))])
+
+
+def _fraction(equilibrium: Equilibrium) -> float:
+    return equilibrium.fraction
+
+
+def _slope_of_load(equilibrium: Equilibrium) -> float:
+    return 1.0 / _compliance(equilibrium)
 
 
 def _compliance(equilibrium: Equilibrium) -> float:

@@ -46,6 +46,8 @@ log = logger("study")
 SAME = 1e-3
 """Two limits whose loads differ by less than this part are one."""
 
+LIMITS = (Event.LIMIT, Event.MINIMUM, Event.AIR_LIMIT)
+
 MARK = "store.json"
 """The file that makes a folder a run's folder; see :mod:`turgor.results.store`."""
 
@@ -278,7 +280,7 @@ def _passable(store: RunStore, behind: int) -> StepRecord | None:
     At a limit it has no direction; from before, the limit is met again.
     """
     before = (store.load(index) for index in reversed(range(behind)))
-    return next((record for record in before if record.solver["event"] not in (Event.LIMIT, Event.MINIMUM)), None)
+    return next((record for record in before if record.solver["event"] not in LIMITS), None)
 
 
 def _is_same(found: Equilibrium, known: StepRecord) -> bool:
