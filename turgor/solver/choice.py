@@ -104,7 +104,7 @@ class WhileCheaper(StiffnessSolver):
         self._affordable = affordable
         self._use(Iterative(system))
 
-    def take_stiffness(self, system: System, state: State) -> None:
+    def _take_stiffness(self, system: System, state: State) -> None:
         """Make ready to solve with the stiffness of a state, and decide how."""
         if isinstance(self._solver, Iterative) and self._is_dearer(self._solver):
             log.info("factorising costs less than %.0f iterations for each tangent", self._affordable)

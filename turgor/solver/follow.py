@@ -306,7 +306,7 @@ class _Post:
 
     def __init__(self, walk: VolumeWalk, on_equilibrium: OnEquilibrium | None) -> None:
         self.walk = walk
-        self.tally = Tally()
+        self.tally = Tally(walk.linear)
         self.last = walk.here
         self.sent: list[Equilibrium] = []
         self._on_equilibrium = on_equilibrium

@@ -67,8 +67,6 @@ class Iterative(StiffnessSolver):
     ----------
     iterations
         Those of each linear problem so far.
-    tangents
-        Number of stiffnesses taken so far.
     """
 
     name = "GMRES with multigrid"
@@ -76,7 +74,6 @@ class Iterative(StiffnessSolver):
 
     def __init__(self, system: System) -> None:
         self.iterations: list[int] = []
-        self.tangents = 0
         self._levels = TwoLevels(system.pattern, system.mesh.points, system.mesh.cells)
         fine = self._levels.fine
         self._pressures = Pressures([solid.nodes for solid in system.solids], fine.rank, self._levels.free)
@@ -90,10 +87,9 @@ class Iterative(StiffnessSolver):
         self._failures = 0
         self._left = 0.0
 
-    def take_stiffness(self, system: System, state: State) -> None:
+    def _take_stiffness(self, system: System, state: State) -> None:
         """Set up the mixed problem and its preconditioner."""
         assert system is self._system
-        self.tangents += 1
         self._factorised = False
         self._state = state
         if self._failures >= FAILURES:

@@ -59,7 +59,7 @@ class LinearSolver(StiffnessSolver):
         self.column = column
         self.n = len(row_start) - 1
 
-    def take_stiffness(self, system: System, state: State) -> None:
+    def _take_stiffness(self, system: System, state: State) -> None:
         """Factorise the stiffness of a state; its pattern is a new one where surfaces have come close to each other.
 
         Of a large model neither the last factors are kept during the assembly, nor the elements' stiffnesses after it.

@@ -34,7 +34,7 @@ class Equilibrium:
     residuals
         Relative out-of-balance force before each iteration and at the end.
     factorisations
-        Number of matrices factorised.
+        Number of matrices factorised for it; of one that a walk delivers, all since the one before.
     negative_pivots
         Negative eigenvalues of the tangent at (or next to) the equilibrium; ``None`` if the linear solver cannot tell.
     compliance

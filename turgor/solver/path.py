@@ -171,7 +171,7 @@ class _Walk:
         self.here = start or Equilibrium(system.reference_state(), 0.0, (0.0,), 0, 0)
         self.past: tuple[Equilibrium, ...] = ()
         self.step = options.largest_step
-        self._tally = Tally()
+        self._tally = Tally(self.linear)
         self._delivered = start
         self._failures = 0
         self._tried_from: Equilibrium | None = None

@@ -49,22 +49,29 @@ class StiffnessSolver(ABC):
     """Solves with the stiffness of one state after another.
 
     ``cheap_again`` says whether a further solution with the same stiffness costs little beside the first,
-    ``tells_inertia`` whether the solver can find the signs of the eigenvalues.
+    ``tells_inertia`` whether the solver can find the signs of the eigenvalues, ``tangents`` how many stiffnesses it has
+    taken so far, whatever became of them.
     """
 
     name: str
     cheap_again: bool = True
     tells_inertia: bool = True
+    tangents: int = 0
 
-    @abstractmethod
     def take_stiffness(self, system: System, state: State) -> None:
-        """Make ready to solve with the stiffness of a state.
+        """Make ready to solve with the stiffness of a state, and count it.
 
         Raises
         ------
         SingularMatrixError
             If it cannot be done.
         """
+        self.tangents += 1
+        self._take_stiffness(system, state)
+
+    @abstractmethod
+    def _take_stiffness(self, system: System, state: State) -> None:
+        """Make ready to solve with the stiffness of a state."""
 
     @abstractmethod
     def solution(self, system: System, right: Floats, accuracy: float = FORCING) -> Solution:
