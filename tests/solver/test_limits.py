@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -274,6 +275,56 @@ def test_behind_a_limit_the_loads_go_on_along_their_line_over_a_kink():
     # On the way down it snaps back from where the pressure is smallest.
     assert [pressure for _, pressure in met] == pytest.approx([LIMIT, LIMIT, MINIMUM, MINIMUM], rel=1e-4)
     assert found[-1].fraction == 1.0
+
+
+@pytest.mark.parametrize(("rise", "full"), [(0.8, 3e-4), (0.8, 1e-3), (0.75, 5e-4)])
+def test_what_it_snaps_to_is_not_the_limit_again(rise, full):
+    up_and_down = Programme((0.0, 0.4, 1.0), (0.0, 1.0, -1.0))
+    system = arch(full, rise=rise, programme=up_and_down)
+    found = solve_path(system, output_fractions(4), options=PathOptions(post_snap=True))
+    crown = int(np.argmax(system.mesh.points[:, 0]))
+    snaps = [(a, b) for a, b in itertools.pairwise(found) if b.event is Event.POST_SNAP]
+    assert [a.event for a, _ in snaps] == [Event.LIMIT, Event.MINIMUM]
+    for limit, beyond in snaps:
+        assert beyond.fraction == limit.fraction
+        assert beyond.stable
+        assert abs(beyond.state.u[crown, 1] - limit.state.u[crown, 1]) > 0.3 * rise
+
+
+def test_friction_of_what_is_out_of_reach_hides_no_limit():
+    def limit(friction: float) -> tuple[Event, float]:
+        bare = arch(1.3 * LIMIT)
+        table = RigidContact(Plane((0.0, -100.0), (0.0, 1.0)), friction=friction)
+        held = [Clamped("x0"), Sliding("x1")]
+        load = Pressure("y1", 1.3 * LIMIT)
+        system = System(
+            bare.mesh, {"body": neo_hookean(1.0, 1e3)}, held, [load], section=PlaneStrain(), contact=[table]
+        )
+        found = solve_path(system, output_fractions(5), options=PathOptions(post_snap=True))
+        assert found[-1].fraction == 1.0
+        ((first, pressure), (snapped, _)) = events(found)
+        assert snapped is Event.POST_SNAP
+        return first, pressure
+
+    assert limit(0.3) == limit(0.0) == (Event.LIMIT, pytest.approx(LIMIT, rel=1e-4))
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_control_by_volume_is_advised_where_it_is_possible(timed):
+    load = {"programme": Programme((0.0, 1.0), (0.0, 1.0))} if timed else {}
+    advice = stop(arch(1.3 * LIMIT, **load), 5).advice
+    assert ("Control by volume" in advice) is not timed
+
+
+def test_a_kink_makes_the_walk_forget_its_past_once():
+    ring = quarter_ring(1.0, 1.5, 2)
+
+    def work(programme: Programme) -> int:
+        load = Pressure("inner", 0.03, programme=programme)
+        system = System(ring, {"body": neo_hookean()}, [Sliding("y0")], [load], section=Axisymmetric())
+        return sum(e.factorisations for e in solve_path(system, output_fractions(10)))
+
+    assert work(Programme((0.0, 0.1, 1.0), (0.0, 0.1000001, 1.0))) <= work(Programme((0.0, 1.0), (0.0, 1.0))) + 2
 
 
 def test_a_bifurcation_by_volume_is_told():

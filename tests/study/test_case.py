@@ -102,6 +102,15 @@ def test_outputs_are_fractions_of_the_pressure(small_tube: Path) -> None:
     case = load_case(small_tube, ["solver={outputs: [5 kPa, 0.2 bar]}"])
     assert case.fractions() == pytest.approx((0.25, 1.0))
     assert case.fractions()[-1] == 1.0
+    for whole, part, units in (
+        ("10 kPa", "100 mbar", "50 mbar"),
+        ("3 kPa", "0.03 bar", "0.01 bar"),
+        ("7 psi", "48.2633010521 kPa", "1 psi"),
+    ):
+        outputs = load_case(
+            small_tube, [f"loads.0.value={whole}", f"solver={{outputs: [{units}, {part}]}}"]
+        ).fractions()
+        assert outputs[-1] == 1.0
     vacuum = load_case(small_tube, ["loads.0.value=-10 kPa", "solver={outputs: [-1 kPa, -10 kPa]}"])
     assert vacuum.fractions() == pytest.approx((0.1, 1.0))
 

@@ -257,6 +257,12 @@ class System:
         """Whether there is friction."""
         return any(contact.friction > 0.0 for contact in self.contacts)
 
+    def rubs_in(self, state: State) -> bool:
+        """Whether friction acts in a state: something that may rub touches, or is held by what touched."""
+        if any(len(rows) for rows in state.grips):
+            return True
+        return any(contact.friction > 0.0 and contact.touch(state).area > 0.0 for contact in self.contacts)
+
     @property
     def has_barrier(self) -> bool:
         """Whether a barrier keeps surfaces apart."""

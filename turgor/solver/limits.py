@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.stops import Facts, at_limit, worst_point
 from turgor.solver.tally import Tally
-from turgor.solver.volume import LimitPoint, VolumeWalk
+from turgor.solver.volume import LimitPoint, VolumeWalk, knows_volume
 
 log = logger("solver")
 
@@ -23,6 +24,9 @@ MOST_VOLUMES = 1000.0
 """Growth of the volume beyond which no rubber goes: tenfold stretch in every direction of a wall."""
 
 REFINEMENTS = 12
+
+BESIDE = 1e-3
+"""Part of what lies between two states by which one between them may be seen beyond one of them."""
 
 
 def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: Tally) -> Equilibrium:
@@ -51,6 +55,9 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         tally.count(found)
         walk.first_step = max(walk.first_step, walk.step)  # the walk ends where steps must be so much shorter again
         log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
+        if not knows_volume(walk.system, found.state):
+            ended = "where surfaces begin to rub"
+            break
         if found.fraction >= goal:
             try:
                 return replace(at_load(walk, goal, previous, found, tally), event=Event.POST_SNAP)
@@ -70,6 +77,9 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
 def at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
     """Return the equilibrium at a load fraction between two states of a walk, the load given.
 
+    A limit has the same load where it lies on the way back to it, and may be nearer to the guess: what does not lie
+    between the two is not what is looked for.
+
     Raises
     ------
     NotConvergedError
@@ -82,9 +92,10 @@ def at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibriu
     for _ in range(REFINEMENTS):
         part = (goal - below.fraction) / (above.fraction - below.fraction)
         guess = above.state.beyond(below.state, part - 1.0)
-        try:
+        found = None
+        with contextlib.suppress(NotConvergedError):
             found = kept_apart(walk.system, at_goal, guess)
-        except NotConvergedError:
+        if found is None or not _lies_between(walk, below, found, above):
             walk.stand_at(above, below)
             middle = walk.at(0.5 * (walk.measure(below) + walk.measure(above)))
             tally.count(middle)
@@ -92,6 +103,12 @@ def at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibriu
             continue
         return found
     raise NotConvergedError(f"no equilibrium after {REFINEMENTS} refinements")
+
+
+def _lies_between(walk: VolumeWalk, below: Equilibrium, found: Equilibrium, above: Equilibrium) -> bool:
+    """Whether a state lies between two others on a walk, or beside one of them through rounding alone."""
+    low, place, high = (walk.measure(e) for e in (below, found, above))
+    return abs(place - 0.5 * (low + high)) <= (0.5 + BESIDE) * abs(high - low)
 
 
 def _why(walk: VolumeWalk, last: Equilibrium, lowest: float, rest: float, ended: str) -> tuple[str, Facts]:

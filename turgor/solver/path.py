@@ -189,6 +189,7 @@ class _Walk:
     def to(self, target: float) -> None:
         """Walk to the load fraction `target`."""
         self._failures = 0
+        turns = target in self.system.loading.kinks and self.here.fraction < target
         while self.here.fraction < target:
             step = self._longest_step()
             aim = min(target, self.here.fraction + step)
@@ -202,7 +203,7 @@ class _Walk:
                 past = () if found.event is Event.POST_SNAP else (*self.past, self.here)[-2:]
                 self._arrive(found)
                 self.past = past
-        if target in self.system.loading.kinks:
+        if turns:
             # Beyond it the path turns: what lies before says nothing of the direction.
             self.past = ()
 
@@ -315,7 +316,7 @@ class _Walk:
     @property
     def _has_volume_control(self) -> bool:
         """Whether volume control may find what the load does not, and has not been tried from here."""
-        return knows_volume(self.system) and self.here is not self._tried_from
+        return knows_volume(self.system, self.here.state) and self.here is not self._tried_from
 
     def _by_volume(self, target: float) -> Equilibrium | None:
         """Follow the path by volume to the load fraction `target`, or to the limit before it.
@@ -344,6 +345,8 @@ class _Walk:
                 return None
             found, limit = stride
             self._tally.count(found)
+            if not knows_volume(system, found.state):
+                return None  # something has begun to rub on the way
             if self.on_progress is not None:
                 self.on_progress(found.fraction, found.iterations, found.residuals[-1])
             if limit is not None and previous.rising:

@@ -9,6 +9,8 @@ import numpy as np
 from turgor.common.errors import SolverError
 from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.contact.term import LARGEST_OVERLAP
+from turgor.fem.loads import Pressure
+from turgor.fem.programme import PROPORTIONAL
 from turgor.fem.surface import surface_stretches
 from turgor.fem.system import System
 from turgor.materials.stability import drucker_margin, verdict
@@ -130,7 +132,7 @@ def at_limit(
         if limit.maximum
         else "the state that it snaps back to is found with control.at_limit: post-snap"
     )
-    if system.cavities and knows_volume(system):
+    if not why_not_further and _follows_volume(system, limit.equilibrium):
         advice = f"Control by volume follows it further; {advice}"
     advice = advice[0].upper() + advice[1:]
     cause = ""
@@ -144,6 +146,14 @@ def at_limit(
         facts=facts | (details or {}),
         limit=limit,
     )
+
+
+def _follows_volume(system: System, here: Equilibrium) -> bool:
+    """Whether a volume could be prescribed in place of the pressures: those of a programme follow time instead."""
+    pressures = [load for load in system.loading.loads if isinstance(load, Pressure)]
+    # One in proportion to time is a programme, too, though its loads are the same.
+    timed = any(load.programme is not PROPORTIONAL for load in pressures)
+    return bool(pressures) and not (timed or system.rubs) and knows_volume(system, here.state)
 
 
 def _beyond(system: System, limit: Equilibrium) -> str:
@@ -242,7 +252,7 @@ def _cause(
         return Outcome.CONTACT, cause, advice, {"contact_area_mm2": area}
     cause = "the material and the elements are sound there"
     advice = "Try smaller steps (solver.largest_step, solver.smallest_step) or a finer mesh"
-    if instead and system.cavities and knows_volume(system):
+    if instead and _follows_volume(system, here):
         advice += f", or control {instead}"
     return Outcome.UNEXPLAINED, cause, advice, {"smallest_drucker_margin": worst.margin, "smallest_det_F": smallest}
 

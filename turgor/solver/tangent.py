@@ -15,7 +15,7 @@ from turgor.fem.system import System
 from turgor.solver.choice import LinearPath
 from turgor.solver.control import Control
 from turgor.solver.linear import SingularMatrixError
-from turgor.solver.stiffness import FORCING, FORCING_FAR, Solution, StiffnessSolver
+from turgor.solver.stiffness import ACCURATE, FORCING, FORCING_FAR, Solution, StiffnessSolver
 
 Floats = NDArray[np.float64]
 
@@ -149,7 +149,8 @@ class Tangent:
         self.compliance: float | None = None
         if control is not None:
             growing = system.free_part(-system.load_direction(state, growth))
-            self._response = linear.solution(system, growing)
+            # The compliance of an equilibrium says where the load has its limit.
+            self._response = linear.solution(system, growing, ACCURATE if self.residual <= NEAR else FORCING)
             self._measured = system.load_direction(state, control.weights)
             self.compliance = -float(np.vdot(self._measured, self._response.u))
         progress.tangents.append((self.residual, linear.negative_pivots or 0))

@@ -354,9 +354,9 @@ class VolumeWalk:
         return change == 0.0 or not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
 
 
-def knows_volume(system: System) -> bool:
-    """Whether the path can be followed by the conjugate of the load: friction and what moves have no one potential."""
-    return not (system.constraints.moves or system.rubs)
+def knows_volume(system: System, state: State) -> bool:
+    """Whether the path can be followed by the conjugate of the load: what rubs and what moves have no one potential."""
+    return not (system.constraints.moves or system.rubs_in(state))
 
 
 def is_monotone(mean: float, at_start: float, at_end: float) -> bool:
