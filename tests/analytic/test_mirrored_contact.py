@@ -9,10 +9,11 @@ from samples import neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.mirror import Mirror
-from turgor.fem.contact.spec import Method, SelfContact
+from turgor.fem.contact.spec import Method, RigidContact, SelfContact
 from turgor.fem.loads import Pressure
+from turgor.fem.rigid import Sphere
 from turgor.fem.section import PlaneStrain
-from turgor.fem.supports import Clamped, ElasticSupport, Sliding, Support
+from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding, Support
 from turgor.fem.system import System
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
@@ -104,3 +105,27 @@ def test_a_body_on_both_sides_of_its_plane_of_symmetry_is_refused():
     supports = [Sliding("symmetry"), Clamped("held")]
     with pytest.raises(InputError, match=r"reaches through its plane of symmetry.*0\.5 mm behind"):
         System(mesh, {"body": neo_hookean()}, supports, contact=[SelfContact()])
+
+
+def force_on_a_ball(width: float, at: float, method: Method = "penalty") -> np.ndarray:
+    """The force, N, on a ball at x = `at` that a block 4 mm wide, or its half x ≥ 0, is pressed on by 1 mm."""
+    block = box((width, 4.0, 2.0), (round(width), 4, 2), "hex27")
+    points = block.points - [width - 2.0, 2.0, 0.0]
+    surfaces = {"down": block.surfaces["z1"], "low": block.surfaces["z0"]}
+    held: list[Support] = [Prescribed("down", (0.0, 0.0, -1.0))]
+    if width == 2.0:
+        surfaces["symmetry"] = block.surfaces["x0"]
+        held.append(Sliding("symmetry"))
+    mesh = Mesh(points, block.cells, surfaces=surfaces)
+    ball = RigidContact(Sphere((at, 0.0, -2.01), 2.0), "low", method=method)
+    system = System(mesh, {"body": neo_hookean(0.1, 100.0)}, held, contact=[ball])
+    (touch,) = system.touches(solve_path(system, output_fractions(4))[-1].state)
+    return np.array(touch.force)
+
+
+def test_half_a_ball_feels_half_of_the_force():
+    half = force_on_a_ball(2.0, 0.0)
+    assert abs(half[0]) < 1e-12
+    assert 2.0 * np.linalg.norm(half) == pytest.approx(np.linalg.norm(force_on_a_ball(4.0, 0.0)), rel=0.02)
+    # A ball beside the plane has another one behind it, which feels its own force.
+    assert abs(force_on_a_ball(2.0, 0.5)[0]) > 0.01

@@ -172,12 +172,15 @@ def _pack(blocks, factor, out):  # type: ignore[no-untyped-def]
                 at += 1
 
 
-def resultants(push: Floats, arm: Floats, *, turned: bool) -> tuple[Triple, Triple]:
+def resultants(push: Floats, arm: Floats, *, turned: bool, across: Floats | None = None) -> tuple[Triple, Triple]:
     """Return force and torque of the pushes ``(n, 3)`` with arms ``(n, 3)``.
 
-    `turned`: the model is a body of revolution, around whose axis y all forces across it cancel.
+    `turned`: the model is a body of revolution, around whose axis y all forces across it cancel. `across`: directions
+    ``(k, 3)``, orthonormal, along which the forces on the mirror images of a half or quarter model cancel.
     """
     force, torque = push.sum(axis=0), np.cross(arm, push).sum(axis=0)
+    if across is not None:
+        force = force - across.T @ (across @ force)
     if turned:
         force[0] = torque[2] = 0.0
     return triple(force), triple(torque)

@@ -70,6 +70,8 @@ class Barrier(Unlagged):
         A rigid body; then the faces meet it, not each other.
     node
         Row of ``State.u`` that is the displacement of the body; ``None``: it stands still.
+    across
+        Directions ``(k, 3)`` in which the forces of the body's other halves cancel its own (:func:`resultants`).
 
     Raises
     ------
@@ -90,12 +92,13 @@ class Barrier(Unlagged):
         section: Section | None = None,
         hull: Hull | None = None,
         node: int | None = None,
+        across: Floats | None = None,
     ) -> None:
         self._ipctk = require("ipctk", "contact by the barrier method")
         self.skin, self.name, self._hull, self._node = skin, name, hull, node
         self.facets = Facets(skin)
         self._d = skin.dimension
-        self._turned = isinstance(section, Axisymmetric)
+        self._turned, self._across = isinstance(section, Axisymmetric), across
         self._rest, self._weights = self._vertices()
         self._spread = sp.kron(self._weights, sp.identity(self._d), format="csr")
         self._mesh = self._collision_mesh(group, section)
@@ -186,7 +189,7 @@ class Barrier(Unlagged):
         if self._hull is not None:
             push = -in_space(pushes[self._n :])
             arm = in_space(self._rest[self._n :] - self._hull.reference_point)
-            force, torque = resultants(push, arm, turned=self._turned)
+            force, torque = resultants(push, arm, turned=self._turned, across=self._across)
         per_wall = None if gap is None else gap / self._wall
         moved = None if self._node is None else triple(in_space(state.u[self._node]))
         return Touch(self.name, area, 0.0, 0.0, force, torque, moved, gap, per_wall, barrier=True)

@@ -10,16 +10,22 @@ from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.skin import STIFFNESS, Skin
 from turgor.fem.contact.term import GROWTH_OF_OVERLAP, Touch
 from turgor.fem.pattern import packed_size
+from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
 from turgor.fem.term import NO_NODES, Unlagged, add_at_nodes, pack_symmetric
-from turgor.mesh.mesh import Mesh
-from turgor.mesh.symmetry import SymmetryPlane
+from turgor.mesh.mesh import Mesh, in_space
+from turgor.mesh.symmetry import SymmetryPlane, planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 IN_PLANE = 1e-3
 """Part of the body's extent by which what lies in a plane may be off it."""
+
+SAMPLES = 200
+ALIKE = 1e-6
+"""A rigid body is halved by a plane if the distances from it of some places and of their images differ by less than
+this part of the actuator's extent."""
 
 
 class Mirror(Unlagged):
@@ -132,3 +138,21 @@ def in_front(mesh: Mesh, plane: SymmetryPlane, faces: Ints) -> Ints:
             expected="a body on one side of each surface 'symmetry…', or another name of the surface",
         )
     return faces[(height[faces] > off).any(axis=1)]
+
+
+def cut_across(body: RigidBody, motion: Floats, mesh: Mesh) -> Floats:
+    """Return the normals ``(k, 3)`` of the planes of symmetry that halve a rigid body, orthonormal.
+
+    Its other halves feel the forces that the mirror images of the actuator exert. A body beside a plane has a whole
+    image of its own behind it.
+    """
+    places = mesh.points[:: 1 + len(mesh.points) // SAMPLES]
+    distance = body.distance(places)[0]
+    normals = []
+    for plane in planes_of_symmetry(mesh):
+        mirrored = places + 2.0 * plane.height(places)[:, None] * plane.normal
+        alike = np.allclose(body.distance(mirrored)[0], distance, rtol=0.0, atol=ALIKE * float(np.ptp(places)))
+        if alike and abs(float(motion @ plane.normal)) <= ALIKE * float(np.linalg.norm(motion)):
+            normals.append(plane.normal)
+    spanned = np.linalg.qr(np.array(normals).T)[0].T if normals else np.empty((0, mesh.dimension))
+    return in_space(spanned)

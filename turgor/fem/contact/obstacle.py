@@ -48,6 +48,8 @@ class Obstacle:
         Place of what it remembers in ``State.grips``.
     node
         Row of ``State.u`` that is the displacement of the body on its spring; ``None``: it is on none.
+    across
+        Directions ``(k, 3)`` in which the forces of the body's other halves cancel its own (:func:`resultants`).
 
     Attributes
     ----------
@@ -68,6 +70,7 @@ class Obstacle:
         friction: float = 0.0,
         number: int = 0,
         node: int | None = None,
+        across: Floats | None = None,
     ) -> None:
         self.skin = skin
         self.body = body
@@ -76,7 +79,7 @@ class Obstacle:
         self.channel = -1 if channel is None else channel
         self.name = name
         self.friction = friction
-        self._turned = turned
+        self._turned, self._across = turned, across
         self._number = number
         self._node = node
         # What counts is where points are as seen from the body: its displacement goes in with minus one.
@@ -222,7 +225,7 @@ class Obstacle:
         np.add.at(push, (face, quad), self._rubbing(state).drag)
         arm = self._places(state.u, state.loads) - self.body.reference_point
         push, arm = (in_space(v.reshape(-1, v.shape[2])) for v in (push, arm))
-        return resultants(push, arm, turned=self._turned)
+        return resultants(push, arm, turned=self._turned, across=self._across)
 
     def _displacement(self, state: State) -> Triple | None:
         """Return how far the body is from its place at rest; nothing if it stands still."""

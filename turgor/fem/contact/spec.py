@@ -13,7 +13,7 @@ from turgor.common.errors import InputError
 from turgor.common.rows import row_numbers
 from turgor.fem.contact.barrier import REACH, Barrier
 from turgor.fem.contact.hull import hull
-from turgor.fem.contact.mirror import Mirror, in_front
+from turgor.fem.contact.mirror import Mirror, cut_across, in_front
 from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.surfaces import SurfaceContact
@@ -183,13 +183,13 @@ def make_contact(
     if isinstance(case, RigidContact):
         faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
         body, motion = _fitting(case, mesh, section)
-        turned = isinstance(section, Axisymmetric)
+        turned, across = isinstance(section, Axisymmetric), cut_across(body, motion, mesh)
         skin = Skin(mesh, faces, materials, pressure, section)
         if barrier:
             error = PARTS_OF_REACH * REACH * float(skin.wall.min())
             around = hull(body, mesh.points, error, f"contact.{case.name}")
-            return Barrier(skin, None, case.name, section, around, node)
-        return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number, node)
+            return Barrier(skin, None, case.name, section, around, node, across)
+        return Obstacle(skin, body, motion, channel, case.name, turned, case.friction, number, node, across)
     faces, group = _meeting(mesh, case, section)
     skin = Skin(mesh, faces, materials, pressure, section)
     if barrier:
