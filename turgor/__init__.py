@@ -34,11 +34,12 @@ if TYPE_CHECKING:
     from turgor.mesh.picture import save_picture as draw_mesh
     from turgor.mesh.quality import quality as mesh_quality
     from turgor.mesh.walls import walls as mesh_walls
+    from turgor.results.files import check_targets
     from turgor.study.api import Model
     from turgor.study.case import Case, Draft, load_case, load_draft
     from turgor.study.environment import environment
     from turgor.study.export.write import export_case
-    from turgor.study.fitting import fit_document, write_fit_report, write_material
+    from turgor.study.fitting import fit_document, fit_report_files, write_fit_report, write_material
     from turgor.study.meshing import mesh_case
     from turgor.study.path import Path
     from turgor.study.run import Run, run
@@ -77,12 +78,14 @@ __all__ = [
     "StlFile",
     "TurgorError",
     "assess",
+    "check_targets",
     "draw_mesh",
     "environment",
     "export_case",
     "find_material",
     "fit",
     "fit_document",
+    "fit_report_files",
     "library",
     "load_case",
     "load_draft",
@@ -114,11 +117,12 @@ _HOMES = {
     "turgor.mesh.picture": ("draw_mesh",),
     "turgor.mesh.quality": ("mesh_quality",),
     "turgor.mesh.walls": ("mesh_walls",),
+    "turgor.results.files": ("check_targets",),
     "turgor.study.api": ("Model",),
     "turgor.study.case": ("Case", "Draft", "load_case", "load_draft"),
     "turgor.study.environment": ("environment",),
     "turgor.study.export.write": ("export_case",),
-    "turgor.study.fitting": ("fit_document", "write_fit_report", "write_material"),
+    "turgor.study.fitting": ("fit_document", "fit_report_files", "write_fit_report", "write_material"),
     "turgor.study.path": ("Path",),
     "turgor.study.meshing": ("mesh_case",),
     "turgor.study.run": ("Run", "run"),

@@ -278,6 +278,87 @@ def test_export_refuses_what_the_program_lacks(tmp_path: Path) -> None:
     assert not (tmp_path / "tube.inp").exists()
 
 
+MESHED = """\
+geometry: {template: mesh, file: FILE}
+materials: {body: {model: neo-hookean, constants: {C10: 0.05 MPa}}}
+supports: [{type: clamped, surface: held}]
+loads: [{type: gravity}]
+"""
+
+DECK = """\
+*Node
+ 1, 0., 0., 0.
+ 2, 1., 0., 0.
+ 3, 0., 1., 0.
+ 4, 0., 0., 1.
+*Include, input=cells.txt
+*Nset, nset=held
+ 1, 2, 3
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "read", "target"),
+    [
+        ("mesh", "part.vtu", None),
+        ("export", "part.inp", None),
+        ("export", "part.inp", "./part.inp"),
+        ("mesh", "part.inp", "linked.vtu"),
+        ("export", "part.inp", "cells.inp"),
+        ("mesh", "part.vtu", "part.yaml"),
+    ],
+)
+def test_no_file_that_is_read_is_written_over(
+    command: str, read: str, target: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    included = "cells.inp" if target == "cells.inp" else "cells.txt"
+    files = {
+        "part.yaml": MESHED.replace("FILE", read),
+        read: DECK.replace("cells.txt", included) if read.endswith(".inp") else "a mesh that nobody looks at",
+        included: "*Element, type=C3D4, elset=body\n 1, 1, 2, 3, 4\n",
+    }
+    for name, text in files.items():
+        Path(name).write_text(text, encoding="utf-8")
+    Path("linked.vtu").symlink_to(read)
+    result = turgor(command, "part.yaml", *(("--out", target) if target else ()))
+    assert result.exit_code == 2, result.output
+    assert f"turgor: {Path(target or read).name}: this file is read here" in result.stderr
+    assert "expected another name" in result.stderr
+    assert {name: Path(name).read_text(encoding="utf-8") for name in files} == files
+    assert not Path(f"{read}.part").exists()
+
+
+@pytest.mark.parametrize("written", [("--out", "fit.json"), ("--report", ".")])
+def test_a_fit_does_not_replace_its_test(
+    written: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    data = Path("fit.json")
+    data.write_bytes(GOOD_TEST.read_bytes())
+    monkeypatch.setattr(tg, "fit", None)  # what would be lost is known before
+    result = turgor("fit", data, "--model", "yeoh-1", *written)
+    assert result.exit_code == 2, result.output
+    assert "turgor: fit.json: this file is read here" in result.stderr
+    assert data.read_bytes() == GOOD_TEST.read_bytes()
+    assert not Path("fit.html").exists()
+
+
+def test_the_python_story_keeps_what_it_reads_too(tmp_path: Path) -> None:
+    data = tmp_path / "pull.csv"
+    data.write_bytes(GOOD_TEST.read_bytes())
+    fitted = tg.fit(tg.read_tests(data), "yeoh-1")
+    with pytest.raises(tg.InputError, match=r"pull.csv: this file is read here"):
+        tg.write_material(fitted, data)
+    deck = tmp_path / "part.inp"
+    deck.write_text(DECK, encoding="utf-8")
+    (tmp_path / "case.yaml").write_text(MESHED.replace("FILE", deck.name), encoding="utf-8")
+    with pytest.raises(tg.InputError, match=r"part.inp: this file is read here"):
+        tg.export_case(tg.load_case(tmp_path / "case.yaml"), deck)
+    assert data.read_bytes() == GOOD_TEST.read_bytes()
+    assert deck.read_text(encoding="utf-8") == DECK
+
+
 @pytest.mark.parametrize(("model", "cells"), [("axisymmetric", "triangles"), ("quarter", "hexahedra")])
 def test_sections_and_rows_are_meshed_too(model: str, cells: str, tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "tube.yaml"

@@ -115,6 +115,8 @@ def fit(
     as_json: AsJson = False,
 ) -> None:
     """Fit material models to tensile and other tests."""
+    written = tg.fit_report_files(report) if report else ()
+    tg.check_targets([out, *written], [*data, *(models or ())])
     tests = tg.read_tests(
         data,
         mode=mode,
@@ -221,8 +223,9 @@ def mesh(
     """Mesh the actuator of a case, write the mesh and say how good it is."""
     with naming(case_file, changes or ()), telling_warnings():
         case = tg.load_draft(case_file, changes or ())
+        path = out or Path(f"{case.name}.vtu")
+        tg.check_targets([path, picture, quality_picture], [case_file, *case.files_read])
         meshed = tg.mesh_case(case, picture)
-    path = out or Path(f"{case.name}.vtu")
     tg.write_mesh(meshed, path)
     if quality_picture:
         tg.draw_mesh(meshed, quality_picture, show="quality")
@@ -249,6 +252,7 @@ def export(
     with naming(case_file, changes or ()):
         case = tg.load_case(case_file, changes or ())
         path = out or Path(f"{case.name}.inp")
+        tg.check_targets([path], [case_file, *case.files_read])
         mesh = tg.export_case(case, path)
     facts = {"file": str(path), "elements": mesh.n_cells, "nodes": mesh.n_points}
     if as_json:

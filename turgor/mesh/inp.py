@@ -5,6 +5,7 @@ meshio's reader leaves out the surfaces and the numbers by which they name their
 
 from __future__ import annotations
 
+import contextlib
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -86,19 +87,29 @@ def read_inp(path: Path) -> RawMesh:
     )
 
 
-def whole_text(path: Path, depth: int = 0) -> str:
-    """Return the text of a .inp file with those of the files that it includes where it does so."""
+def whole_text(path: Path, depth: int = 0, found: list[Path] | None = None) -> str:
+    """Return the text of a .inp file with those of the files that it includes where it does so; add all to `found`."""
     if depth > _DEEPEST:
         raise InputError("the files include each other without end")
+    if found is not None:
+        found.append(path)
     head, *blocks = _BLOCK.split(path.read_text(encoding="utf-8", errors="replace"))
     parts = [head]
     for block in blocks:
         if _INCLUDE.match(block):
             _, options, _ = _taken_apart(block)
-            parts.append(whole_text(_included(path, options), depth + 1))
+            parts.append(whole_text(_included(path, options), depth + 1, found))
         else:
             parts.append(f"*{block}")
     return "".join(part if part.endswith("\n") or not part else f"{part}\n" for part in parts)
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return a .inp file and every file that it includes, however deep, as far as they can be read."""
+    found: list[Path] = [path]
+    with contextlib.suppress(InputError, OSError):  # told where the mesh is read
+        whole_text(path, found=found)
+    return list(dict.fromkeys(found))
 
 
 def _included(path: Path, options: dict[str, str]) -> Path:

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -99,7 +99,29 @@ def _sync_folder(folder: Path) -> None:
 
 def is_same_file(copy: Path, path: Path) -> bool:
     """Say whether a place that may be empty holds the very file at `path`."""
-    return copy.exists() and copy.samefile(path)
+    return copy.exists() and path.exists() and copy.samefile(path)
+
+
+def check_targets(targets: Iterable[str | Path | None], read: Iterable[str | Path]) -> None:
+    """Refuse to write where a file lies that is read; to be called before anything is computed.
+
+    Parameters
+    ----------
+    targets
+        The files to be written; ``None`` stands for one that nobody asked for.
+    read
+        The files that are read: the case, its data, tests.
+
+    Raises
+    ------
+    InputError
+        If a target is one of the files that are read, under whatever name.
+    """
+    sources = [Path(path) for path in read]
+    for target in (Path(path) for path in targets if path is not None):
+        if any(is_same_file(target, source) for source in sources):
+            problem = "this file is read here, and what is to be written would replace it"
+            raise InputError(problem, file=target, expected="another name for what is written")
 
 
 class FolderLock:

@@ -24,6 +24,7 @@ from turgor.common.units import PositiveLength, to_internal
 from turgor.fem.system import System
 from turgor.geometry.imported.mesh_file import MeshFile
 from turgor.geometry.space import Space
+from turgor.mesh.inp import files_of
 from turgor.solver.choice import LinearPath
 from turgor.solver.newton import NewtonOptions
 from turgor.solver.path import PathOptions, output_fractions
@@ -205,6 +206,19 @@ class Draft(Setup):
             raise invalid(f"these {what}s do not lead from 0 to {end}", key=key, expected=expected)
         return fractions
 
+    @property
+    def data_files(self) -> list[Path]:
+        """The files that the case names, each once: tests and models of materials, measured motion and shapes."""
+        of_materials = [path for choice in self.materials.values() for path in choice.files]
+        data = self.model_dump(mode="json", exclude_none=True, include={"geometry", "regions"})
+        measured = [path for choice in self.measures or () for path in choice.files]
+        return list(dict.fromkeys([*of_materials, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
+
+    @property
+    def files_read(self) -> list[Path]:
+        """The data files and what they include: what nothing may be written over."""
+        return [file for path in self.data_files for file in (files_of(path) if path.suffix == ".inp" else [path])]
+
 
 class Case(Draft):
     """One study of one actuator: what it is made of, how it is held and loaded, and what is to be known of it.
@@ -215,14 +229,6 @@ class Case(Draft):
     materials: dict[str, MaterialChoice] = Field(min_length=1, description="region of the actuator: its material")
     supports: tuple[Support, ...] = Field(min_length=1)
     loads: tuple[Load, ...] = Field(min_length=1)
-
-    @property
-    def data_files(self) -> list[Path]:
-        """The files that the case names, each once: tests and models of materials, measured motion and shapes."""
-        of_materials = [path for choice in self.materials.values() for path in choice.files]
-        data = self.model_dump(mode="json", exclude_none=True, include={"geometry", "regions"})
-        measured = [path for choice in self.measures or () for path in choice.files]
-        return list(dict.fromkeys([*of_materials, *measured, *(Path(shape["file"]) for shape in _with_file(data))]))
 
     def course(self, system: System) -> Course:
         """Return the course of the run: which states are asked for, and how the solver gets there.

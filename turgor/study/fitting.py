@@ -12,6 +12,7 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.materials.fit_result import FitReport
 from turgor.materials.least_squares import predict
+from turgor.results.files import check_targets
 from turgor.results.fit_report import FILE_NAME, material_yaml, write_fit_page
 
 _POINTS = 200
@@ -44,8 +45,9 @@ def write_material(report: FitReport, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written or holds one of the tests.
     """
+    check_targets([path], _files(report))
     text = material_yaml(report)
     try:
         Path(path).write_text(text, encoding="utf-8")
@@ -59,13 +61,24 @@ def write_fit_report(report: FitReport, folder: str | Path) -> Path:
     Raises
     ------
     InputError
-        If the folder cannot be written.
+        If the folder cannot be written, or a test lies where a file is to be written.
     """
+    check_targets(fit_report_files(folder), _files(report))
     document = fit_document(report)
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        (place / "fit.json").write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        return write_fit_page(report, place / FILE_NAME)
+        data, page = fit_report_files(place)
+        data.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        return write_fit_page(report, page)
     except OSError as error:
         raise InputError(f"the report cannot be written: {error.strerror}", file=place) from error
+
+
+def fit_report_files(folder: str | Path) -> tuple[Path, Path]:
+    """Return the files of the report of a fit in a folder: ``fit.json`` and the page ``fit.html``."""
+    return Path(folder) / "fit.json", Path(folder) / FILE_NAME
+
+
+def _files(report: FitReport) -> list[str]:
+    return [test.file for test in report.tests if test.file]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from turgor.common.errors import InputError
 from turgor.mesh import Mesh
+from turgor.results.files import check_targets
 from turgor.study.case import Case
 from turgor.study.export import calculix, febio
 from turgor.study.export.problem import Problem, problem_of
@@ -39,12 +40,13 @@ def export_case(case: Case, path: str | Path) -> Mesh:
     ------
     InputError
         If the suffix is another one, the program lacks something that the case uses, the case cannot be run as it
-        stands, or the file cannot be written.
+        stands, or the file cannot be written or is one that the case reads.
     """
     path = Path(path)
     if path.suffix not in _PROGRAMS:
         expected = "a name that ends in .inp (CalculiX, Abaqus) or .feb (FEBio)"
         raise InputError("models of this kind are not written", file=path, value=path.suffix, expected=expected)
+    check_targets([path], case.files_read)
     program, writer = _PROGRAMS[path.suffix]
     materials, _ = build_materials(case.materials)
     mesh = checked_mesh(case)
