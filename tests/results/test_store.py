@@ -150,6 +150,15 @@ def test_resume_goes_on_where_the_run_stopped(tmp_path: Path, small_finger: Mesh
         assert (folder / name).read_bytes() == (straight / name).read_bytes()
 
 
+def test_a_summary_stays_until_a_step_is_added(tmp_path: Path, small_finger: Mesh) -> None:
+    folder = finished_run(tmp_path / "run", small_finger, np.array([0.1, 0.2]))
+    RunStore.resume(folder).close()
+    assert RunStore.open(folder).summary is not None
+    with RunStore.resume(folder) as store:
+        store.append(bent_record(small_finger, 2, 0.3))
+    assert RunStore.open(folder).summary is None
+
+
 def test_what_a_killed_process_left_is_cleaned_and_rebuilt(tmp_path: Path, small_finger: Mesh) -> None:
     folder = started_run(tmp_path / "run", small_finger, 2)
     whole = (folder / "history.csv").read_bytes()

@@ -135,9 +135,15 @@ def test_a_finished_run_is_resumed_without_a_step(whole: Run) -> None:
 
 
 def test_a_run_of_another_case_is_not_resumed(whole: Run) -> None:
+    before = contents(whole.folder)
     other = load_case(whole.folder / "case.yaml", ["loads.0.value=19 kPa"])
     with pytest.raises(InputError, match="one of another case"):
         run(other, whole.folder, resume=True)
+    assert contents(whole.folder) == before
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_run_is_not_overwritten_unasked(whole: Run) -> None:

@@ -163,7 +163,7 @@ class RunStore:
 
     @classmethod
     def resume(cls, folder: str | Path) -> Self:
-        """Open a run to add steps; what a killed process left half-written is removed.
+        """Open a run to add steps; what a killed process left half-written is removed, a summary when there is more.
 
         Raises
         ------
@@ -176,7 +176,6 @@ class RunStore:
             for leftover in [*place.glob(f"*{PARTIAL}"), *place.glob(f"{_STEPS}/*{PARTIAL}")]:
                 leftover.unlink()
             store = cls(place, *content, lock=lock)
-            (place / _SUMMARY).unlink(missing_ok=True)
             store._write_tables()
         return store
 
@@ -197,6 +196,7 @@ class RunStore:
         state = StoredState(self.body, record)
         entry, curves = row(state, self.measures), known_measures.tables(self.measures, state)
         path = self._step_file(record.index)
+        self._outdate()
         save_vtu(path.with_suffix(".vtu"), self.mesh, record)
         save_record(path, record, entry, curves)
         self._rows.append(entry)
@@ -225,6 +225,7 @@ class RunStore:
     def write_fit(self, fit: Mapping[str, Any]) -> None:
         """Write the fit of the material (what ``turgor fit --json`` prints, with its curves) for the report."""
         self._check_writable()
+        self._outdate()
         write_text(self.folder / _FIT, json_text(fit))
 
     @property
@@ -294,6 +295,10 @@ class RunStore:
     def _check_writable(self) -> None:
         if self._lock is None:
             raise InputError("the run is open only to be read", file=self.folder, expected="RunStore.create or .resume")
+
+    def _outdate(self) -> None:
+        """Remove the summary of a run that goes on: not before, or who is refused to resume it would lose it."""
+        (self.folder / _SUMMARY).unlink(missing_ok=True)
 
     def _write_tables(self) -> None:
         write_text(self.folder / _HISTORY, as_csv(self._rows))
