@@ -21,6 +21,7 @@ from results.hollow_finger import CASE, bent_record, finished_run
 from turgor.common.errors import InputError
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import EDGES
+from turgor.results.curve_plots import line
 from turgor.results.record import ARRAY_FIELDS, PLAIN_FIELDS
 from turgor.results.store import RunStore
 from turgor.results.summary import summarise
@@ -148,6 +149,20 @@ def test_resume_goes_on_where_the_run_stopped(tmp_path: Path, small_finger: Mesh
     straight = finished_run(tmp_path / "straight", small_finger, np.array([0.1, 0.2, 0.3, 0.4]))
     for name in ("history.csv", "result.pvd", "case.yaml"):
         assert (folder / name).read_bytes() == (straight / name).read_bytes()
+
+
+def test_curves_under_a_programme_say_their_time(tmp_path: Path, small_finger: Mesh) -> None:
+    with RunStore.create(tmp_path, small_finger, CASE, measures=["centreline"]) as store:
+        for index, time in enumerate((1.5, 3.0)):
+            record = bent_record(small_finger, index, 0.5 * (index + 1))
+            solver = {**record.solver, "time_s": time}
+            store.append(dataclasses.replace(record, loads={"pressure:cavity": 0.002}, solver=solver))
+    with (tmp_path / "curves" / "centreline.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0])[:5] == ["step", "fraction", "time_s", "pressure_kPa", "station"]
+    assert {row["time_s"] for row in rows} == {"1.5", "3.0"}
+    drawn = line(RunStore.open(tmp_path).curves["centreline"])
+    assert [trace.name for trace in drawn.data if trace.showlegend] == ["1.5 s", "3 s"]
 
 
 def test_a_summary_stays_until_a_step_is_added(tmp_path: Path, small_finger: Mesh) -> None:

@@ -53,7 +53,7 @@ from turgor.results.summary import as_json
 LAYOUT = 1
 """Version of the layout of the folder."""
 
-_OF_LOAD = ("step", "fraction", "pressure_kPa")
+_OF_LOAD = ("step", "fraction", "time_s", "pressure_kPa")
 """Columns of the history that a curve repeats."""
 
 _STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
