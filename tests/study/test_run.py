@@ -119,6 +119,8 @@ def test_an_interrupted_run_keeps_its_steps_and_is_resumed(whole: Run, small_tub
     watch = Watch()
     resumed = run(case, folder, resume=True, progress=watch)
     assert resumed.converged
+    steps = [row["wall_s"] for row in RunStore.open(folder).history]
+    assert resumed.summary["solver"]["wall_s"] > sum(steps)
     assert watch.fractions == [0.75, 1.0]
     assert "mesh" not in watch.stages
     assert displacements(folder) == pytest.approx(displacements(whole.folder), abs=1e-5)
@@ -129,9 +131,31 @@ def test_an_interrupted_run_keeps_its_steps_and_is_resumed(whole: Run, small_tub
 def test_a_finished_run_is_resumed_without_a_step(whole: Run) -> None:
     before = displacements(whole.folder)
     watch = Watch()
-    assert run(load_case(whole.folder / "case.yaml"), whole.folder, resume=True, progress=watch).converged
+    again = run(load_case(whole.folder / "case.yaml"), whole.folder, resume=True, progress=watch)
+    assert again.converged
     assert watch.fractions == []
+    assert again.summary["solver"]["wall_s"] == whole.summary["solver"]["wall_s"]
     assert np.array_equal(displacements(whole.folder), before)
+
+
+@pytest.mark.usefixtures("unreported")
+@pytest.mark.parametrize("summed_up", [True, False])
+def test_a_resumed_run_counts_the_time_of_its_earlier_parts(small_tube: Path, tmp_path: Path, summed_up: bool) -> None:
+    folder, case = tmp_path / "run", load_case(small_tube)
+    run(case, folder)
+    (folder / "steps" / "0003.npz").unlink()
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary["solver"] |= {"wall_s": 1000.0, "peak_memory_MB": 1e6}
+    (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    if not summed_up:  # as where the process was killed
+        (folder / "summary.json").unlink()
+        steps = [row["wall_s"] for row in RunStore.open(folder).history]
+    begun = time.perf_counter()
+    solver = run(case, folder, resume=True).summary["solver"]
+    lasted = time.perf_counter() - begun
+    earlier = 1000.0 if summed_up else sum(steps)
+    assert earlier < solver["wall_s"] < earlier + lasted
+    assert (solver["peak_memory_MB"] == 1e6) is summed_up
 
 
 def test_a_run_of_another_case_is_not_resumed(whole: Run) -> None:

@@ -267,6 +267,19 @@ class RunStore:
         return read_json(self.folder / _SUMMARY) if (self.folder / _SUMMARY).exists() else None
 
     @property
+    def spent(self) -> tuple[float, float]:
+        """What the run has cost so far: its time in s, and its largest memory in MB (0 where no summary says so).
+
+        Where a part was cut short before its summary, its time is that of its steps.
+        """
+        try:
+            solver = (self.summary or {}).get("solver", {})
+        except InputError:  # damaged: the run is to be resumed, which writes another
+            solver = {}
+        steps = sum(float(entry["wall_s"]) for entry in self._rows)
+        return float(solver.get("wall_s") or steps), float(solver.get("peak_memory_MB") or 0.0)
+
+    @property
     def fit(self) -> dict[str, Any] | None:
         """The fit of the material, or None if the run has none."""
         return read_json(self.folder / _FIT) if (self.folder / _FIT).exists() else None

@@ -59,9 +59,9 @@ def summarise(
     dofs
         Free degrees of freedom.
     wall_s
-        Duration of the whole run in s.
+        Duration of the whole run in s, of all its parts where it was resumed.
     peak_memory_mb
-        Largest resident memory in MB.
+        Largest resident memory in MB, of any part.
     """
     final = {key: value for key, value in history[-1].items() if key not in _NOT_FINAL} if history else {}
     if all(key in final for key in _TIP):

@@ -125,6 +125,7 @@ class _Running:
         self.case, self.folder, self.show, self.run_log = case, folder, show, run_log
         self.begun = time.perf_counter()
         self._doubted: set[str] = set()
+        self._walked = False
         self.files = data_names(case)
 
     def run(self, *, continues: bool) -> Run:
@@ -148,10 +149,11 @@ class _Running:
                     self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
                 self.run_log.write_to(self.folder / "run.log", append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
+                spent = store.spent
                 if fit:
                     store.write_fit(fit_document(fit))
                 stop = self._walk(system, course, store)
-                summary = self._summary(system, store, stop)
+                summary = self._summary(system, store, stop, spent)
                 store.finish(summary)
         self.show.stage("report")
         report(self.folder)
@@ -197,6 +199,7 @@ class _Running:
         known = [store.load(index) for index in range(last.index + 1 if last else 0, store.n_steps)]
         if last and last.fraction >= 1.0 and not known:
             return None
+        self._walked = True
         start, earlier = (to_equilibrium(system, record) if record else None for record in (last, before))
         self.show.stage("load")
         recorder = Recorder(system, store.n_steps, course)
@@ -259,7 +262,12 @@ class _Running:
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")
 
-    def _summary(self, system: System, store: RunStore, stop: SolverError | None) -> Summary:
+    def _summary(
+        self, system: System, store: RunStore, stop: SolverError | None, spent: tuple[float, float]
+    ) -> Summary:
+        """Return the summary; `spent` are the time in s and the memory in MB of the parts before this one."""
+        # To look at a finished run once more is no part of it.
+        wall_s = time.perf_counter() - self.begun if self._walked else 0.0
         summary = summarise(
             store.history,
             store.mesh,
@@ -267,8 +275,8 @@ class _Running:
             reason=_stopped(stop, store.history) if stop else _reached(store.history),
             outcome=_outcome(stop, store.history),
             dofs=system.n_dofs,
-            wall_s=time.perf_counter() - self.begun,
-            peak_memory_mb=peak_memory_mb(),
+            wall_s=spent[0] + wall_s,
+            peak_memory_mb=max(spent[1], peak_memory_mb()),
         )
         last = store.last()
         return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})
