@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +113,28 @@ def test_an_unexpected_failure_leaves_one_line_and_a_log(tmp_path: Path, monkeyp
     assert "turgor: unexpected ZeroDivisionError: a flaw in two lines; please report it with" in result.stderr
     (log,) = tmp_path.glob("turgor-*.log")
     assert "Traceback" in log.read_text(encoding="utf-8")
+
+
+def test_what_the_system_refuses_is_no_flaw_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*arguments: object, **options: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", "/somewhere")
+
+    monkeypatch.setattr("turgor.study.course.solve_path", refused)
+    result = turgor("run", SMALL, "--out", tmp_path / "run")
+    assert result.exit_code == 2
+    assert "Permission denied: '/somewhere'" in result.stderr
+    assert "report it" not in result.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full disk")
+@pytest.mark.parametrize("arguments", [["schema"], ["materials"], ["--version"], ["run", "--help"]])
+def test_a_full_disk_under_standard_output_is_told_in_one_line(arguments: list[str]) -> None:
+    with Path("/dev/full").open("wb") as full:
+        command = [sys.executable, "-m", "turgor", *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "No space left on device" in done.stderr
 
 
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -108,6 +108,9 @@ def test_the_drawing_fills_its_picture(name, tmp_path):
 
 
 def test_a_drawing_is_a_png_of_a_template(tmp_path):
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(InputError, match=r"folder\.png: the picture cannot be written"):
+        save_drawing(actuator("tube"), tmp_path / "folder.png")
     with pytest.raises(InputError, match=r"saved as \.png"):
         save_drawing(actuator("tube"), tmp_path / "tube.pdf")
 

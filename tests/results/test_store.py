@@ -19,6 +19,7 @@ import pytest
 from results.hollow_finger import CASE, bent_record, finished_run
 
 from turgor.common.errors import InputError
+from turgor.common.writing import UnwritableError
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.tet10 import EDGES
 from turgor.results.curve_plots import line
@@ -246,6 +247,17 @@ def test_two_runs_cannot_write_one_folder(tmp_path: Path, small_finger: Mesh) ->
             RunStore.create(folder, small_finger, CASE, overwrite=True)
         assert RunStore.open(folder).n_steps == 1
     RunStore.resume(folder).close()
+
+
+def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, small_finger: Mesh) -> None:
+    folder = started_run(tmp_path / "run", small_finger, 1)
+    (folder / ".lock").unlink()
+    (folder / ".lock").mkdir()  # cannot be opened, whoever tries
+    with pytest.raises(UnwritableError, match=r"\.lock: the file cannot be written"):
+        RunStore.resume(folder)
+    with pytest.raises(UnwritableError, match=r"\.lock: the file cannot be written"):
+        RunStore.create(folder, small_finger, CASE, overwrite=True)
+    assert RunStore.open(folder).n_steps == 1
 
 
 def test_an_open_store_only_reads(run_folder: Path, finger: Mesh) -> None:

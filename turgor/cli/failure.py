@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import signal
 import tempfile
@@ -16,9 +17,13 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 import turgor as tg
+from turgor.cli.output import leave_standard_output
 
 _CommandLineError: type[Exception] = typer.BadParameter.__bases__[0]
 """What typer raises, and words itself, for a command line that is not well formed."""
+
+_OF_THE_SYSTEM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
+"""No room and no right are the machine's to say, wherever it says so."""
 
 EXIT_UNEXPECTED = 1
 EXIT_INTERRUPTED = 130
@@ -33,22 +38,36 @@ class Terminated(KeyboardInterrupt):
 class Commands(TyperGroup):
     """The group of commands; turns every exception into one message on standard error and an exit code."""
 
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        """Read the command line, and print help or version where it asks for them."""
+        with _telling_failure():
+            return super().make_context(*arguments, **options)
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for."""
-        try:
-            with _heeding_termination():
-                return super().invoke(ctx)
-        except tg.TurgorError as error:
-            tell(str(error))
-            raise typer.Exit(error.exit_code) from error
-        except KeyboardInterrupt as error:
-            tell(str(error) or "interrupted")
-            raise typer.Exit(EXIT_TERMINATED if isinstance(error, Terminated) else EXIT_INTERRUPTED) from error
-        except (typer.Exit, typer.Abort, BrokenPipeError, _CommandLineError):
-            raise
-        except Exception as error:  # the last line of defence: no user ever sees a traceback
-            tell(f"unexpected {type(error).__name__}: {_one_line(error)}; please report it with {_keep(error)}")
-            raise typer.Exit(EXIT_UNEXPECTED) from error
+        with _telling_failure(), _heeding_termination():
+            return super().invoke(ctx)
+
+
+@contextlib.contextmanager
+def _telling_failure() -> Iterator[None]:
+    try:
+        yield
+    except tg.TurgorError as error:
+        tell(str(error))
+        raise typer.Exit(error.exit_code) from error
+    except KeyboardInterrupt as error:
+        tell(str(error) or "interrupted")
+        raise typer.Exit(EXIT_TERMINATED if isinstance(error, Terminated) else EXIT_INTERRUPTED) from error
+    except (typer.Exit, typer.Abort, BrokenPipeError, _CommandLineError):
+        raise
+    except Exception as error:  # the last line of defence: no user ever sees a traceback
+        if isinstance(error, OSError) and error.errno in _OF_THE_SYSTEM:
+            leave_standard_output()  # help is printed without a look at whether there is room
+            tell(f"the system refuses to go on: {_one_line(error)}")
+            raise typer.Exit(tg.InputError.exit_code) from error
+        tell(f"unexpected {type(error).__name__}: {_one_line(error)}; please report it with {_keep(error)}")
+        raise typer.Exit(EXIT_UNEXPECTED) from error
 
 
 @contextlib.contextmanager

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.mesh.faces import host_cells
 from turgor.mesh.mesh import Mesh
 
@@ -46,10 +47,8 @@ def write_deck(mesh: Mesh, path: str | Path) -> None:
         raise InputError("this kind of deck is not known", file=path, value=path.suffix, expected=expected)
     if mesh.cells.shape[1] != 10:
         raise InputError("only meshes of ten-node tetrahedra are written as decks", file=path)
-    try:
+    with writing(path, "the mesh cannot be written"):
         path.write_text("\n".join(writers[path.suffix](mesh)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"the mesh cannot be written: {error.strerror}", file=path) from error
 
 
 def inp_lines(mesh: Mesh) -> Iterator[str]:

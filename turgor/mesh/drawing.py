@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.geometry.actuator import Actuator
 from turgor.geometry.drawing import AIR, OUTSIDE, Distance, Pointer, Turn, View, Window
+from turgor.mesh.picture import check_png
 
 WIDTH, _DPI = 11.0, 130
 """Of a drawing, in inches."""
@@ -50,11 +52,10 @@ def save_drawing(actuator: Actuator, path: str | Path, picture: Any = None) -> N
     Raises
     ------
     InputError
-        If the path does not end in .png, or the shape has no drawing.
+        If the path does not end in .png or nothing can be written there, or the shape has no drawing.
     """
     views = actuator.views()
-    if Path(path).suffix != ".png":
-        raise InputError("a picture is saved as .png", value=str(path))
+    check_png(path)
     if not views:
         raise InputError("this shape has no dimensioned drawing", value=actuator.template)
     layouts = [_Layout(view) for view in views]
@@ -73,7 +74,8 @@ def save_drawing(actuator: Actuator, path: str | Path, picture: Any = None) -> N
         axes = figure.add_axes((0.0, 0.0, 1.0, below / height))
         axes.imshow(picture)
         axes.set_axis_off()
-    figure.savefig(path, facecolor="white")
+    with writing(path, "the picture cannot be written"):
+        figure.savefig(path, facecolor="white")
 
 
 class _Layout:

@@ -18,6 +18,7 @@ import meshio
 import numpy as np
 
 from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.mesh.cells import body_cell, cells_of_corners, face_cell, is_body_cell
 from turgor.mesh.elevate import KINDS
 from turgor.mesh.faces import outward_faces
@@ -69,13 +70,11 @@ def write(mesh: Mesh, path: str | Path) -> None:
     """
     path = Path(path)
     writer = None if path.suffix == ".vtk" else _format(path)[0]
-    try:
+    with writing(path, "the mesh cannot be written"):
         if writer:
             writer(path, *_to_sets(mesh))
         else:
             _write_vtk(path, mesh)
-    except OSError as error:
-        raise InputError(f"the mesh cannot be written: {error.strerror}", file=path) from error
 
 
 def read(path: str | Path) -> Mesh:

@@ -12,6 +12,7 @@ import numpy as np
 from turgor.common.errors import InputError
 from turgor.common.optional import require
 from turgor.common.rows import row_numbers
+from turgor.common.writing import writing
 from turgor.mesh.faces import boundary_faces, host_cells
 from turgor.mesh.mesh import Mesh, in_space
 from turgor.mesh.quality import quality
@@ -178,6 +179,12 @@ def colour_of(name: str) -> str | None:
     return next((colour for start, colour in COLOURS.items() if name.startswith(start)), None)
 
 
+def check_png(path: str | Path) -> None:
+    """Raise InputError if a path does not end in .png."""
+    if Path(path).suffix != ".png":
+        raise InputError("a picture is saved as .png", value=str(path), expected="a name that ends in .png")
+
+
 @contextlib.contextmanager
 def drawing(path: str | Path, **options: Any) -> Iterator[Any]:
     """Open a plotter without a screen, white, and save what was drawn as a PNG file.
@@ -189,8 +196,7 @@ def drawing(path: str | Path, **options: Any) -> Iterator[Any]:
     MissingPackageError
         If pyvista or a system library that it loads is absent.
     """
-    if Path(path).suffix != ".png":
-        raise InputError("a picture is saved as .png", key="path", value=str(path))
+    check_png(path)
     pyvista, logger = require("pyvista"), require("vtkmodules.vtkCommonCore").vtkLogger
     # Without a screen VTK falls back to EGL by itself, but warns on the way about the X server it did not find.
     verbosity = logger.GetCurrentVerbosityCutoff()
@@ -199,9 +205,8 @@ def drawing(path: str | Path, **options: Any) -> Iterator[Any]:
     try:
         plotter.set_background("white", all_renderers=True)
         yield plotter
-        plotter.screenshot(str(path))
-    except OSError as error:
-        raise InputError(f"the picture cannot be written: {error.strerror}", file=path) from error
+        with writing(path, "the picture cannot be written"):
+            plotter.screenshot(str(path))
     finally:
         plotter.close()
         logger.SetStderrVerbosity(verbosity)

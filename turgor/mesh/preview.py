@@ -12,7 +12,7 @@ from turgor.geometry.actuator import Actuator
 from turgor.mesh.drawing import save_drawing
 from turgor.mesh.generate import generate
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.picture import save_picture
+from turgor.mesh.picture import check_png, save_picture
 
 
 def save_preview(actuator: Actuator, path: str | Path) -> None:
@@ -23,14 +23,13 @@ def save_preview(actuator: Actuator, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the path does not end in .png or its folder does not exist, the shape has no drawing, is too thin for its
-        size to be meshed, or gmsh finds no valid mesh.
+        If the path does not end in .png, its folder does not exist or may not be written, the shape has no drawing, is
+        too thin for its size to be meshed, or gmsh finds no valid mesh.
     MissingPackageError
         If gmsh, pyvista or a system library that they load is absent.
     """
     path = Path(path)
-    if path.suffix != ".png":
-        raise InputError("a picture is saved as .png", value=str(path))
+    check_png(path)
     if not path.parent.is_dir():
         raise InputError("there is no such folder", value=str(path.parent))
     with tempfile.TemporaryDirectory() as folder:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from turgor.common.errors import InputError
+from turgor.common.writing import UnwritableError, writing
 
 if sys.platform == "win32":
     import msvcrt
@@ -29,30 +30,33 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    InputError
+    UnwritableError
         If the system does not let it be written: no room, no right.
     """
     partial = path.with_name(path.name + PARTIAL)
     try:
-        yield partial
-        with partial.open("rb+") as stream:
-            os.fsync(stream.fileno())
-        partial.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
+        with writing(path):
+            yield partial
+            with partial.open("rb+") as stream:
+                os.fsync(stream.fileno())
+            partial.replace(path)
+            _sync_folder(path.parent)
+    except UnwritableError:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
-        raise UnwritableError(f"the file cannot be written ({error.strerror or error})", file=path) from error
-
-
-class UnwritableError(InputError):
-    """The system does not let a file be written: no room, no right."""
+        raise
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file in one piece."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
+
+
+def remove(path: Path) -> None:
+    """Remove a file that may not be there; raise UnwritableError if the system does not let it be removed."""
+    with writing(path):
+        path.unlink(missing_ok=True)
 
 
 def read_text(path: Path) -> str:
@@ -130,11 +134,12 @@ class FolderLock:
     Raises
     ------
     InputError
-        If another writer holds the folder.
+        If another writer holds the folder, or the system does not let it be written.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._stream = (folder / LOCK).open("a+b")
+        with writing(folder / LOCK):
+            self._stream = (folder / LOCK).open("a+b")
         try:
             if sys.platform == "win32":
                 msvcrt.locking(self._stream.fileno(), msvcrt.LK_NBLCK, 1)

@@ -29,6 +29,7 @@ from xml.sax.saxutils import quoteattr
 import yaml
 
 from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.results import measures as known_measures
@@ -43,7 +44,17 @@ from turgor.results.archive import (
     save_record,
     save_vtu,
 )
-from turgor.results.files import LOCK, PARTIAL, FolderLock, is_same_file, json_text, read_json, read_text, write_text
+from turgor.results.files import (
+    LOCK,
+    PARTIAL,
+    FolderLock,
+    is_same_file,
+    json_text,
+    read_json,
+    read_text,
+    remove,
+    write_text,
+)
 from turgor.results.history import as_csv, row
 from turgor.results.measures import Choice
 from turgor.results.record import StepRecord
@@ -132,10 +143,8 @@ class RunStore:
         was_run = any((place / name).is_file() for name in (_STORE, LOCK))
         if not was_run:
             _check_foreign(place, files or {})
-        try:
+        with writing(place, "the folder cannot be made"):
             (place / _STEPS).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"the folder cannot be made: {error.strerror}", file=place) from error
         lock = FolderLock(place)
         if was_run:
             _remove_run(place)
@@ -174,7 +183,7 @@ class RunStore:
         content = _read_store(place)
         with _locked(place) as lock:
             for leftover in [*place.glob(f"*{PARTIAL}"), *place.glob(f"{_STEPS}/*{PARTIAL}")]:
-                leftover.unlink()
+                remove(leftover)
             store = cls(place, *content, lock=lock)
             store._write_tables()
         return store
@@ -311,12 +320,13 @@ class RunStore:
 
     def _outdate(self) -> None:
         """Remove the summary of a run that goes on: not before, or who is refused to resume it would lose it."""
-        (self.folder / _SUMMARY).unlink(missing_ok=True)
+        remove(self.folder / _SUMMARY)
 
     def _write_tables(self) -> None:
         write_text(self.folder / _HISTORY, as_csv(self._rows))
         for title, rows in self.curves.items():
-            (self.folder / _CURVES).mkdir(exist_ok=True)
+            with writing(self.folder / _CURVES, "the folder cannot be made"):
+                (self.folder / _CURVES).mkdir(exist_ok=True)
             write_text(self.folder / _CURVES / f"{title}.csv", as_csv(rows))
         sets = "".join(
             f'    <DataSet timestep="{time!r}" file={quoteattr(f"{_STEPS}/{index:04d}.vtu")}/>\n'
@@ -396,7 +406,7 @@ def _check_foreign(folder: Path, files: Mapping[Path, str]) -> None:
 def _remove_run(folder: Path) -> None:
     """Remove the files of an earlier run."""
     for name in _FILES:
-        (folder / name).unlink(missing_ok=True)
+        remove(folder / name)
     for pattern in _PATTERNS:
         for path in folder.glob(pattern):
-            path.unlink()
+            remove(path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain, count
 from pathlib import Path
 
+from turgor.common.writing import writing
 from turgor.mesh.inp import whole_text
 from turgor.results.files import is_same_file
 from turgor.study.case import Case
@@ -27,8 +28,10 @@ def copy_data(names: dict[Path, str], folder: Path) -> None:
     for path, name in names.items():
         copy = folder / name
         if not is_same_file(copy, path):
-            copy.parent.mkdir(exist_ok=True)
-            copy.write_bytes(_content(path))
+            content = _content(path)
+            with writing(copy):
+                copy.parent.mkdir(exist_ok=True)
+                copy.write_bytes(content)
 
 
 def same_data(names: dict[Path, str], folder: Path) -> bool:

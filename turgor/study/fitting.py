@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.materials.fit_result import FitReport
 from turgor.materials.least_squares import predict
 from turgor.results.files import check_targets
@@ -49,10 +49,8 @@ def write_material(report: FitReport, path: str | Path) -> None:
     """
     check_targets([path], _files(report))
     text = material_yaml(report)
-    try:
+    with writing(path, "the material cannot be written"):
         Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"the material cannot be written: {error.strerror}", file=path) from error
 
 
 def write_fit_report(report: FitReport, folder: str | Path) -> Path:
@@ -66,13 +64,11 @@ def write_fit_report(report: FitReport, folder: str | Path) -> Path:
     check_targets(fit_report_files(folder), _files(report))
     document = fit_document(report)
     place = Path(folder)
-    try:
+    with writing(place, "the report cannot be written"):
         place.mkdir(parents=True, exist_ok=True)
         data, page = fit_report_files(place)
         data.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
         return write_fit_page(report, page)
-    except OSError as error:
-        raise InputError(f"the report cannot be written: {error.strerror}", file=place) from error
 
 
 def fit_report_files(folder: str | Path) -> tuple[Path, Path]:

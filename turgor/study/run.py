@@ -17,10 +17,10 @@ from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
 from turgor.common.names import PRESSURE_PREFIX
 from turgor.common.units import from_internal
+from turgor.common.writing import UnwritableError
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
-from turgor.results.files import UnwritableError
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from turgor.common.log import LOGGER_NAME
+from turgor.common.writing import writing
 
 _FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 _CAPACITY = 100_000
@@ -31,8 +32,15 @@ class RunLog:
         return self
 
     def write_to(self, path: Path, *, append: bool) -> None:
-        """Write everything so far, and from now on, to the file `path`, behind what is there or instead of it."""
-        self._file = logging.FileHandler(path, mode="a" if append else "w", encoding="utf-8")
+        """Write everything so far, and from now on, to the file `path`, behind what is there or instead of it.
+
+        Raises
+        ------
+        UnwritableError
+            If the system does not let the file be written.
+        """
+        with writing(path):
+            self._file = logging.FileHandler(path, mode="a" if append else "w", encoding="utf-8")
         self._file.setFormatter(logging.Formatter(_FORMAT))
         self._memory.setTarget(self._file)
         self._memory.flush()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from turgor.common.errors import InputError
+from turgor.common.writing import writing
 from turgor.mesh import Mesh
 from turgor.results.files import check_targets
 from turgor.study.case import Case
@@ -51,8 +52,6 @@ def export_case(case: Case, path: str | Path) -> Mesh:
     materials, _ = build_materials(case.materials)
     mesh = checked_mesh(case)
     lines = list(writer(problem_of(case, mesh, materials, program)))
-    try:
+    with writing(path, "the model cannot be written"):
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"the model cannot be written: {error.strerror}", file=path) from error
     return mesh
