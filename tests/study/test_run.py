@@ -170,6 +170,36 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.parametrize(
+    ("folder", "changes", "words"),
+    [
+        ("mine.yaml", [], r"mine\.yaml: .* cannot be made here: this is a file; expected a folder"),
+        ("mine.yaml/run", [], r"mine\.yaml: .* cannot be made here: this is a file; expected a folder"),
+        ("case", [], r"case/history\.csv: this file is no run's"),
+        ("closed/run", [], r"closed: .* cannot be written.*expected another folder"),
+        (
+            "run",
+            ["geometry.model=axisymmetric", "measures=[bending_angle]"],
+            r"'bending_angle' has no meaning in a body",
+        ),
+        ("run", ["measures=[twist, twist]"], r"measures: two measures are called 'twist_deg'"),
+    ],
+)
+def test_what_needs_no_mesh_is_refused_before_there_is_one(
+    small_tube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, changes: list[str], words: str
+) -> None:
+    (tmp_path / "mine.yaml").write_text("mine", encoding="utf-8")
+    (tmp_path / "case" / "history.csv").write_text("mine", encoding="utf-8")
+    (tmp_path / "closed").mkdir()
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path).name != "closed")
+    watch = Watch()
+    with pytest.raises(InputError, match=words):
+        run(load_case(small_tube, changes), tmp_path / folder, progress=watch)
+    assert watch.stages == []
+    assert not (tmp_path / "run").exists()
+    assert (tmp_path / "mine.yaml").read_text(encoding="utf-8") == "mine"
+
+
 def test_a_run_is_not_overwritten_unasked(whole: Run) -> None:
     with pytest.raises(InputError, match=r"holds a run already.*--overwrite"):
         run(load_case(whole.folder / "case.yaml"), whole.folder)

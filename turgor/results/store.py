@@ -19,6 +19,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -29,7 +30,7 @@ from xml.sax.saxutils import quoteattr
 import yaml
 
 from turgor.common.errors import InputError
-from turgor.common.writing import writing
+from turgor.common.writing import UnwritableError, writing
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.results import measures as known_measures
@@ -140,9 +141,8 @@ class RunStore:
                 file=place,
                 expected="another folder, or to resume or overwrite that run",
             )
-        was_run = any((place / name).is_file() for name in (_STORE, LOCK))
-        if not was_run:
-            _check_foreign(place, files or {})
+        check_place(place, files or {})
+        was_run = _is_run(place)
         with writing(place, "the folder cannot be made"):
             (place / _STEPS).mkdir(parents=True, exist_ok=True)
         lock = FolderLock(place)
@@ -388,6 +388,37 @@ def _read_store(folder: Path) -> tuple[Body, tuple[Choice, ...]]:
         raise InputError(f"the file is damaged: {error}", file=folder / _STORE) from error
     known_measures.check(measures, body)
     return body, measures
+
+
+def check_place(folder: Path, files: Mapping[Path, str]) -> None:
+    """Refuse a place that a run cannot be written into; nothing is made there yet.
+
+    Parameters
+    ----------
+    folder
+        Of the run; it need not exist.
+    files
+        Data file → name of its copy in the folder.
+
+    Raises
+    ------
+    InputError
+        If it is a file or in one, may not be written, or holds files with the names of a run's that no run has written.
+    """
+    with writing(folder, "the folder cannot be made"):
+        there = next(path for path in (folder, *folder.parents) if path.exists())
+        if not there.is_dir():
+            problem = "the folder of a run cannot be made here: this is a file"
+            raise InputError(problem, file=there, expected="a folder (--out)")
+        if not os.access(there, os.W_OK | os.X_OK):
+            problem = "the folder of a run cannot be written: there is no right to"
+            raise UnwritableError(problem, file=there, expected="another folder (--out)")
+    if not _is_run(folder):
+        _check_foreign(folder, files)
+
+
+def _is_run(folder: Path) -> bool:
+    return any((folder / name).is_file() for name in (_STORE, LOCK))
 
 
 def _check_foreign(folder: Path, files: Mapping[Path, str]) -> None:

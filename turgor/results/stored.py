@@ -10,13 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from turgor.fem.cavity import Cavity
-from turgor.fem.section import Axisymmetric, Section, section_of
+from turgor.fem.section import Section, section_of
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.results.record import StepRecord
 
 FloatArray = npt.NDArray[np.float64]
 ModelKind = Literal["space", "plane", "axisymmetric"]
+
+
+def kind_of(section: PlaneSection | None) -> ModelKind:
+    """Return the kind of model that a drawing is, which for one in space has no section."""
+    if section is None:
+        return "space"
+    return "axisymmetric" if section.kind == "axisymmetric" else "plane"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +55,7 @@ class Body:
     @property
     def kind(self) -> ModelKind:
         """Whether it is a body in space, a slice in a plane, or turned about the y axis."""
-        if self.mesh.dimension == 3:
-            return "space"
-        return "axisymmetric" if isinstance(self.mechanics, Axisymmetric) else "plane"
+        return "plane" if self.section is None and self.mesh.dimension == 2 else kind_of(self.section)
 
     def enclosed_volume(self, surface: str, displacement: FloatArray) -> float:
         """Return the volume in mm³ that a surface encloses when its nodes have moved by `displacement` ``(n, d)``.

@@ -21,9 +21,11 @@ from turgor.common.writing import UnwritableError
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
+from turgor.results.measures import check_kinds
 from turgor.results.record import StepRecord
 from turgor.results.report import report
-from turgor.results.store import RunStore
+from turgor.results.store import RunStore, check_place
+from turgor.results.stored import kind_of
 from turgor.results.summary import Summary, summarise
 from turgor.solver.control import ATMOSPHERE
 from turgor.solver.events import Event, Outcome
@@ -102,31 +104,32 @@ def run(
     Raises
     ------
     InputError
-        If the case cannot be run as it stands, the folder holds a run and neither `resume` nor `overwrite` is
-        asked for, or both are, or the run to resume is one of another case.
+        If the case cannot be run as it stands, the folder cannot be written, it holds a run and neither `resume` nor
+        `overwrite` is asked for, or both are, or the run to resume is one of another case.
     KeyboardInterrupt
         Passed on with a message that says how to resume.
     """
     if resume and overwrite:
         raise InputError("a run is either resumed or overwritten", key="--resume", expected="only one of the two")
-    place = Path(folder)
+    place, files = Path(folder), data_names(case)
+    check_place(place, files)
+    check_kinds(case.measures or (), kind_of(case.geometry.section))
     stored = (place / MARK).is_file()
     if stored and not (resume or overwrite):
         expected = "another folder, or resume (--resume) or overwrite (--overwrite)"
         raise InputError("the folder holds a run already", file=place, expected=expected)
     with RunLog() as run_log:
-        return _Running(case, place, progress or Silent(), run_log).run(continues=stored and resume)
+        return _Running(case, place, files, progress or Silent(), run_log).run(continues=stored and resume)
 
 
 class _Running:
     """One run on its way; the parts of :func:`run` share what is here."""
 
-    def __init__(self, case: Case, folder: Path, show: Progress, run_log: RunLog) -> None:
-        self.case, self.folder, self.show, self.run_log = case, folder, show, run_log
+    def __init__(self, case: Case, folder: Path, files: dict[Path, str], show: Progress, run_log: RunLog) -> None:
+        self.case, self.folder, self.files, self.show, self.run_log = case, folder, files, show, run_log
         self.begun = time.perf_counter()
         self._doubted: set[str] = set()
         self._walked = False
-        self.files = data_names(case)
 
     def run(self, *, continues: bool) -> Run:
         if any(isinstance(choice, FittedMaterial) for choice in self.case.materials.values()):

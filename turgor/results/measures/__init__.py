@@ -5,7 +5,7 @@ columns of ``history.csv`` and entries of ``summary.json``.
 """
 
 from turgor.results.measures import along, force, markers, motion, stress
-from turgor.results.measures.registry import MEASURES, Choice, Measure, available, check, evaluate, tables
+from turgor.results.measures.registry import MEASURES, Choice, Measure, available, check, check_kinds, evaluate, tables
 
 __all__ = [
     "MEASURES",
@@ -14,6 +14,7 @@ __all__ = [
     "along",
     "available",
     "check",
+    "check_kinds",
     "evaluate",
     "force",
     "markers",

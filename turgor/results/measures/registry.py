@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -186,7 +186,26 @@ def available(body: Body) -> tuple[Choice, ...]:
     return tuple(Choice(entry, entry.parameters()) for entry in entries if not entry.missing(body))
 
 
-def check(choices: Iterable[Choice], body: Body) -> None:
+def check_kinds(choices: Iterable[Choice], kind: ModelKind) -> None:
+    """Refuse what is wrong with measures in a kind of model whatever its mesh.
+
+    Raises
+    ------
+    InputError
+        If a measure has no meaning in it, or two measures have the same key.
+    """
+    seen: set[str] = set()
+    for choice in choices:
+        entry = choice.entry
+        _check_kind(entry, kind)
+        for key in [choice.title] if entry.is_curve else choice.keys:
+            if key in seen:
+                expected = "each measure once; those of a kind with a 'name' of their own"
+                raise InputError(f"two measures are called '{key}'", key="measures", expected=expected)
+            seen.add(key)
+
+
+def check(choices: Sequence[Choice], body: Body) -> None:
     """Evaluate the measures on the body at rest, so that what cannot be measured is known before a run begins.
 
     Raises
@@ -194,16 +213,11 @@ def check(choices: Iterable[Choice], body: Body) -> None:
     InputError
         If the body lacks what a measure needs, a parameter names nothing, or two measures have the same key.
     """
+    check_kinds(choices, body.kind)
     rest = body.at_rest()
-    seen: set[str] = set()
     for choice in choices:
         entry = choice.entry
         _check_possible(entry, body)
-        for key in [choice.title] if entry.is_curve else choice.keys:
-            if key in seen:
-                expected = "each measure once; those of a kind with a 'name' of their own"
-                raise InputError(f"two measures are called '{key}'", key="measures", expected=expected)
-            seen.add(key)
         try:
             choice.of(rest)
         except InputError as error:
@@ -260,12 +274,15 @@ def _register(
     MEASURES[name] = Measure(name, keys, surfaces, markers, models, function, parameters, by_default, is_curve)
 
 
-def _check_possible(entry: Measure, body: Body) -> None:
-    if body.kind not in entry.models:
+def _check_kind(entry: Measure, kind: ModelKind) -> None:
+    if kind not in entry.models:
         expected = " or ".join(_KINDS[kind] for kind in entry.models)
-        raise InputError(
-            f"the measure '{entry.name}' has no meaning in {_KINDS[body.kind]}", key="measures", expected=expected
-        )
+        problem = f"the measure '{entry.name}' has no meaning in {_KINDS[kind]}"
+        raise InputError(problem, key="measures", expected=expected)
+
+
+def _check_possible(entry: Measure, body: Body) -> None:
+    _check_kind(entry, body.kind)
     missing = entry.missing(body)
     if missing:
         there = f"surfaces {_listed(body.mesh.surfaces)}; markers {_listed(body.mesh.markers)}"
