@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from turgor.common.errors import InputError
+from turgor.common.units import EXAMPLES as EXAMPLES_OF_QUANTITIES
 from turgor.common.units import to_internal
 from turgor.geometry import cad
 from turgor.geometry.tube import CappedTube
@@ -247,6 +249,40 @@ def test_the_schema_names_every_key_and_template() -> None:
     names = {entry["properties"]["template"]["const"] for entry in schema["properties"]["geometry"]["oneOf"]}
     assert {"tube", "pneunet"} <= names
     assert json.loads(json.dumps(schema)) == schema
+
+
+def test_the_defaults_of_the_schema_are_what_turgor_accepts() -> None:
+    schema = Case.model_json_schema()
+    dimensions = {example: dimension for dimension, example in EXAMPLES_OF_QUANTITIES.items()}
+    read = []
+
+    def check(node: dict[str, Any], value: Any) -> None:
+        if "$ref" in node:
+            check(schema["$defs"][node["$ref"].rsplit("/", 1)[1]], value)
+        elif "examples" in node:
+            read.append(to_internal(value, dimensions[node["examples"][0]]))
+        elif isinstance(value, list):
+            for number, item in enumerate(value):
+                check(node["prefixItems"][number] if "prefixItems" in node else node["items"], item)
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                if item is not None and key in node.get("properties", {}):
+                    check(node["properties"][key], item)
+
+    def walk(node: Any) -> None:
+        for part in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+            walk(part)
+        if isinstance(node, dict) and node.get("default") is not None:
+            check(node, node["default"])
+
+    walk(schema)
+    assert len(read) > 60
+    defaults = {name: part["properties"] for name, part in schema["$defs"].items() if "properties" in part}
+    assert defaults["GravityCase"]["acceleration"]["default"] == "9.80665 m/s^2"
+    assert defaults["AirControl"]["surroundings"]["default"] == "0.101325 MPa"
+    assert defaults["HelicalCase"]["origin"]["default"] == ["0 mm"] * 3
+    (gravity,) = Setup.read(supports=HELD, loads=[{"type": "gravity"}]).loads
+    assert gravity.build().acceleration == (0.0, 0.0, -9806.65)
 
 
 def test_a_quantity_of_the_examples_means_what_it_says() -> None:

@@ -158,7 +158,8 @@ def quantity_type(dimension: str, minimum: float | None = None, exclusive: bool 
     """Make a pydantic field type that reads text with a unit and holds an internal float.
 
     With `minimum`, smaller values are refused (`exclusive`: equal ones too). The field is written back as
-    text with its internal unit, and its JSON Schema is a string.
+    text with its internal unit, and its JSON Schema is a string. A default is given as text too, with
+    ``validate_default=True``: the schema shows it as it is, and an editor writes it into a case.
     """
 
     def read(value: object) -> float:

@@ -130,7 +130,7 @@ class GravityCase(StrictModel):
     """Weight of every region that has a density."""
 
     type: Literal["gravity"]
-    acceleration: Acceleration = 9806.65
+    acceleration: Acceleration = Field(default="9.80665 m/s^2", validate_default=True)
     direction: Direction | None = Field(default=None, description="left out, down: −z, in a plane model −y")
 
     def build(self, dimension: int = 3) -> Gravity:

@@ -77,7 +77,9 @@ class AirControl(StrictModel):
         description="volume of the air at the pressure of the surroundings, or per cent of that in the cavity at rest"
     )
     cavity: str | None = Field(default=None, description="needed where several cavities are under pressure")
-    surroundings: PositivePressure = Field(default=ATMOSPHERE, description="pressure of the surroundings")
+    surroundings: PositivePressure = Field(
+        default=f"{ATMOSPHERE} MPa", validate_default=True, description="pressure of the surroundings"
+    )
 
 
 class ArcLengthControl(StrictModel):

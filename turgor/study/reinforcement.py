@@ -103,7 +103,7 @@ class HelicalCase(StrictModel):
     type: Literal["helical"]
     angle: Angle
     axis: Direction = (0.0, 0.0, 1.0)
-    origin: Place = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")
+    origin: Place = Field(default=("0 mm", "0 mm", "0 mm"), validate_default=True, description="a point on the axis")
 
     def build(self) -> directions.Helical:
         """Return the field of directions."""
