@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -154,6 +155,24 @@ def test_fit_prints_what_was_promised(tmp_path: Path) -> None:
     for key in ("parameters", "units", "rmse_MPa", "residual_norm_MPa", "r2", "stable"):
         assert key in found["fits"][0]
     assert found["data"]
+
+
+def test_constants_of_a_fit_carry_their_unit(tmp_path: Path) -> None:
+    models = ("--model", "ogden-1", "--model", "gent", "--model", "yeoh-1")
+    table = " ".join(turgor("fit", GOOD_TEST, *models, "--report", tmp_path).stdout.split())
+    for pattern in (
+        r"C10 = \S+ MPa",
+        r"mu1 = \S+ MPa, alpha1 = [\d.-]+ (?!MPa)",
+        r"mu = \S+ MPa, Jm = [\d.e+]+ (?!MPa)",
+    ):
+        assert re.search(pattern, table), table
+    page = " ".join((tmp_path / "fit.html").read_text(encoding="utf-8").split())
+    assert re.search(r"mu1 = \S+ MPa", page)
+    assert not re.search(r"alpha1 = \S+ MPa", page)
+    fits = {entry["model"]: entry for entry in printed("fit", GOOD_TEST, *models, "--json")["fits"]}
+    assert fits["ogden-1"]["parameter_units"] == {"mu1": "MPa", "alpha1": ""}
+    assert fits["gent"]["parameter_units"] == {"mu": "MPa", "Jm": ""}
+    assert fits["gent"]["units"] == "MPa"
 
 
 def test_a_fit_says_which_rows_it_does_not_use(tmp_path: Path) -> None:

@@ -41,7 +41,9 @@ def fits(report: FitReport) -> Table:
     table = _table("", "", "model", "RMSE / MPa", "R²", "stable", "constants")
     for entry in report.fits:
         mark = "→" if entry.model == report.recommended else ""
-        constants = ", ".join(f"{name} = {value:.5g}" for name, value in entry.parameters.items())
+        constants = ", ".join(
+            f"{name} = {value:.5g} {entry.units[name]}".rstrip() for name, value in entry.parameters.items()
+        )
         stability = "yes" if entry.stable else "no"
         table.add_row(mark, entry.model, f"{entry.rmse:.4g}", f"{entry.r2:.5f}", stability, constants)
     table.caption, table.caption_justify = report.reason, "left"

@@ -274,6 +274,7 @@ def _judged(
         model=kind.name + (CONSTRAINED if constrained else ""),
         material=material,
         parameters=parameters,
+        units={constant.name: constant.unit for constant in kind.constants()},
         rmse=float(np.sqrt(squares / len(residual))),
         residual_norm=float(np.sqrt(squares)),
         relative_rmse=float(np.sqrt(squares)) / size if size > 0 else float("nan"),

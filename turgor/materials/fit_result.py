@@ -48,6 +48,8 @@ class Fit:
         Printed name, followed by ``" (constrained)"`` where the fit was made to keep the limits.
     material
         The fitted material, ``None`` where its initial shear modulus is not positive.
+    units
+        Constant → the unit of its value, empty for a pure number.
     rmse, residual_norm
         Of the nominal stress over all points, MPa; the norm is √Σr².
     relative_rmse
@@ -76,6 +78,7 @@ class Fit:
     bic: float
     stable: bool
     stability: Verdict | None
+    units: Mapping[str, str] = field(default_factory=dict)
     confidence: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     correlation: Array = field(default_factory=lambda: np.zeros((0, 0)))
     digit_sensitivity: float = np.inf
@@ -106,11 +109,15 @@ class Fit:
         return self.biaxial_ratios.get(1.5, np.nan)
 
     def as_dict(self) -> dict[str, object]:
-        """Return the fit in plain values, keys ending in their unit; what is not finite is ``None``."""
+        """Return the fit in plain values, keys ending in their unit; what is not finite is ``None``.
+
+        ``units`` is the unit of all constants that have one, ``parameter_units`` that of each, empty for a pure number.
+        """
         return {
             "model": self.model,
             "parameters": dict(self.parameters),
             "units": "MPa",
+            "parameter_units": dict(self.units),
             "rmse_MPa": self.rmse,
             "residual_norm_MPa": self.residual_norm,
             "relative_rmse": _finite(self.relative_rmse),
