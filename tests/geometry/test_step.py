@@ -128,9 +128,11 @@ def test_rules_that_do_not_fit_the_part_are_refused(hollow, changes, message):
 
 
 def test_a_key_that_is_missing_is_named(hollow):
-    with pytest.raises(InputError, match=r"^mount: this key is missing$"):
+    with pytest.raises(InputError, match=r"^mount: this key is missing; expected where the actuator is held$"):
         StepFile(file=hollow)
-    with pytest.raises(InputError, match=r"^file: this key is missing \(also wrong: mount\)$"):
+    with pytest.raises(
+        InputError, match=r"^file: this key is missing \(also wrong: mount\); expected path of the file$"
+    ):
         StepFile()
 
 

@@ -107,6 +107,10 @@ def test_absent_and_unknown_files_are_refused(mesh, tmp_path):
         read(tmp_path / "none.msh")
     with pytest.raises(InputError, match=r"found '.obj'\); expected a name that ends in .msh or .vtu"):
         write(mesh, tmp_path / "mesh.obj")
+    with pytest.raises(InputError, match=r"'.obj'.*\.vtu, or in \.vtk \(straight cells only\)$"):
+        write(mesh, tmp_path / "mesh.obj")
+    with pytest.raises(InputError, match=r"'.obj'.*\.vtu, or in \.inp \(a deck of another program\)$"):
+        read(tmp_path / "mesh.obj")
     with pytest.raises(InputError, match="the mesh cannot be written"):
         write(mesh, tmp_path / "no" / "folder.vtu")
 

@@ -20,6 +20,7 @@ from turgor.study.datafiles import data_names
 from turgor.study.materials import build_materials
 from turgor.study.meshing import mesh_case
 from turgor.study.setup import Setup
+from turgor.study.validation import suggestion
 
 HELD = [{"type": "clamped", "surface": "mount"}]
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
@@ -240,6 +241,48 @@ def test_names_that_become_files_are_names(small_tube: Path, change: str, key: s
     with pytest.raises(InputError, match="cannot be a name") as found:
         load_case(small_tube, [change])
     assert found.value.key == key
+
+
+PULL = "loads.0={type: traction, surface: outer"
+MOUNT = "{normal: [0, 0, -1]}"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("control={type: volume}", "control.target: MISSING volume with unit, or per cent of that at rest"),
+        (f"{PULL}, value: 3 kPa, direction: [0, 1]}}", "loads.0.direction.2: MISSING a number"),
+        (f"{PULL}, direction: [0, 1, 0]}}", "loads.0.value: MISSING pressure with unit, such as '12 psi'"),
+        ("measures=[{displacement: {at: [0 mm, 0 mm]}}]", "at.2: MISSING length with unit, such as '3 mm'"),
+        ("materials.body={model: yeoh-1}", "body.constants: MISSING 'key: value' lines"),
+        (f"geometry={{template: stl, file: small.yaml, mount: {MOUNT}}}", "geometry.unit: MISSING "),
+        ("measures=[foo]", "measures.0: there is no such measure (found 'foo'); expected one of: bending_angle, "),
+        ("measures=[3]", "measures.0: there is no such measure (found 3); expected the name of one"),
+        ("geometry.model=whole", "geometry.model: this value does not fit (found 'whole'); expected 'full', 'half', "),
+        (
+            "geometry={template: pneunet, chambers: 2.5}",
+            "chambers: this value does not fit (found 2.5); expected a whole",
+        ),
+        ("supports.0={type: elastic, surface: outer, stiffness: 3 N/mm^2}", "'N/mm^2' is not a unit of stiffness per"),
+    ],
+)
+def test_a_message_says_what_would_be_right(small_tube: Path, change: str, words: str) -> None:
+    with pytest.raises(InputError) as found:
+        load_case(small_tube, [change])
+    assert words.replace("MISSING", "this key is missing; expected") in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "expected"),
+    [
+        ("cavity", ["cavity-2", "cavity-1"], "'cavity-1' or 'cavity-2' (of: cavity-1, cavity-2)"),
+        ("cavity", [f"cavity-{k}" for k in range(1, 6)], "one of: cavity-1, cavity-2, cavity-3, cavity-4, cavity-5"),
+        ("outr", ["outer", "mount"], "'outer' (of: mount, outer)"),
+        ("x", [], "one of: nothing"),
+    ],
+)
+def test_names_that_are_as_near_are_all_suggested(name: str, known: list[str], expected: str) -> None:
+    assert suggestion(name, known) == expected
 
 
 def test_the_schema_names_every_key_and_template() -> None:

@@ -29,7 +29,7 @@ INTERNAL_UNITS: dict[str, str] = {
     "force": "N",
     "stiffness": "N/mm",
     "bending stiffness": "N mm^2",
-    "foundation": "N/mm^3",
+    "stiffness per area": "N/mm^3",
     "density": "t/mm^3",
     "acceleration": "mm/s^2",
     "time": "s",
@@ -52,7 +52,7 @@ EXAMPLES: dict[str, str] = {
     "force": "1.5 N",
     "stiffness": "0.5 N/mm",
     "bending stiffness": "20 N mm^2",
-    "foundation": "0.01 N/mm^3",
+    "stiffness per area": "0.01 N/mm^3",
     "density": "1070 kg/m^3",
     "acceleration": "9.81 m/s^2",
     "time": "2 s",
@@ -108,7 +108,7 @@ def to_internal(value: object, dimension: str, *, key: str | None = None) -> flo
     if dimension == "angle" and quantity.unitless:
         raise InputError("a unit is missing", key=key, value=value, expected=expected)
     if not quantity.check(_unit(target).dimensionality):
-        raise InputError(f"'{quantity.units:~}' is not a unit of {dimension}", key=key, value=value, expected=expected)
+        raise InputError(f"{_unit_text(value)} is not a unit of {dimension}", key=key, value=value, expected=expected)
     number = float(quantity.to(_unit(target)).magnitude)
     if not math.isfinite(number):
         raise InputError("the number is not finite", key=key, value=value, expected=expected)
@@ -152,6 +152,12 @@ def _parse(text: str, expected: str, key: str | None) -> pint.Quantity[Any]:
     except Exception as error:  # pint's parser lets several kinds of exception through
         raise InputError("this is not a quantity with a known unit", key=key, value=text, expected=expected) from error
     return registry().Quantity(float(match["number"]), unit)
+
+
+def _unit_text(value: object) -> str:
+    """Return the unit of a quantity in quotes, of a text as it stands there."""
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    return f"'{match['unit'].strip()}'" if match else f"'{getattr(value, 'units', value):~P}'"
 
 
 def quantity_type(dimension: str, minimum: float | None = None, exclusive: bool = False) -> Any:
@@ -201,7 +207,7 @@ PositivePressure = quantity_type("pressure", 0.0, exclusive=True)
 Force = quantity_type("force")
 Stiffness = quantity_type("stiffness", 0.0, exclusive=True)
 BendingStiffness = quantity_type("bending stiffness", 0.0, exclusive=True)
-Foundation = quantity_type("foundation", 0.0, exclusive=True)
+Foundation = quantity_type("stiffness per area", 0.0, exclusive=True)
 Density = quantity_type("density", 0.0, exclusive=True)
 Acceleration = quantity_type("acceleration")
 Compliance = quantity_type("compliance", 0.0, exclusive=True)

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from turgor.common.errors import InputError
+from turgor.common.findings import what_fits, what_is_missing
 from turgor.common.units import NonNegativeLength, PositiveLength
 from turgor.geometry.blocks import Blocks
 from turgor.geometry.drawing import View
@@ -234,8 +235,8 @@ def _input_error(error: ValidationError, kind: type[Actuator]) -> InputError:
         expected = "one of: " + ", ".join(kind.model_fields)
         return InputError(f"'{kind.template}' has no such parameter{also}", key=key, expected=expected)
     if first["type"] == "missing":
-        return InputError(f"this key is missing{also}", key=key)
+        return InputError(f"this key is missing{also}", key=key, expected=what_is_missing(kind, first["loc"]))
     cause = first.get("ctx", {}).get("error")
     if first["type"] == "value_error" and cause is not None:
         return InputError(f"{cause}{also}", key=key)
-    return InputError(f"{first['msg']}{also}", key=key, value=first["input"])
+    return InputError(f"this value does not fit{also}", key=key, value=first["input"], expected=what_fits(first))

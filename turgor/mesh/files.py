@@ -69,7 +69,8 @@ def write(mesh: Mesh, path: str | Path) -> None:
         If the suffix is another one or the file cannot be written.
     """
     path = Path(path)
-    writer = None if path.suffix == ".vtk" else _format(path)[0]
+    _check_suffix(path, ".vtk", "straight cells only")
+    writer = None if path.suffix == ".vtk" else _FORMATS[path.suffix][0]
     with writing(path, "the mesh cannot be written"):
         if writer:
             writer(path, *_to_sets(mesh))
@@ -89,8 +90,7 @@ def read(path: str | Path) -> Mesh:
         If the file is absent, of another kind, damaged, cut short, or holds no valid mesh.
     """
     path = Path(path)
-    if path.suffix != ".inp":
-        _format(path)
+    _check_suffix(path, ".inp", "a deck of another program")
     if not path.is_file():
         raise InputError("there is no such file", file=path)
     try:
@@ -124,7 +124,7 @@ def _read_by_meshio(path: Path) -> Mesh:
     stored = {".msh": meshio.gmsh, ".vtu": meshio.vtu}[path.suffix].read(path)
     own = [*stored.field_data, *stored.cell_data]
     if any(name.startswith("region:") for name in own):
-        _, reader = _format(path)
+        _, reader = _FORMATS[path.suffix]
         return _from_sets(*reader(stored))
     return assembled(raw_mesh(stored))
 
@@ -263,8 +263,7 @@ Reader = Callable[[meshio.Mesh], tuple[FloatArray, Sets]]
 _FORMATS: dict[str, tuple[Writer, Reader]] = {".msh": (_write_msh, _read_msh), ".vtu": (_write_vtu, _read_vtu)}
 
 
-def _format(path: Path) -> tuple[Writer, Reader]:
-    if path.suffix not in _FORMATS:
-        expected = "a name that ends in " + " or ".join(_FORMATS)
+def _check_suffix(path: Path, further: str, what: str) -> None:
+    if path.suffix not in (*_FORMATS, further):
+        expected = f"a name that ends in {' or '.join(_FORMATS)}, or in {further} ({what})"
         raise InputError("this kind of mesh file is not known", file=path, value=path.suffix, expected=expected)
-    return _FORMATS[path.suffix]

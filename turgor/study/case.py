@@ -317,7 +317,7 @@ def _load(kind: type[Kind], path: str | Path, changes: Sequence[str]) -> Kind:
     try:
         return kind.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
-        found = explain(error, data)
+        found = explain(error, data, kind)
     except InputError as error:
         found = error
     raise found.read_from(path, changes)

@@ -10,18 +10,19 @@ from pydantic_core import CoreSchema
 
 from turgor.common.errors import InputError
 from turgor.results.measures import MEASURES, Choice
-from turgor.study.validation import inlined, invalid, suggestion
+from turgor.study.validation import inlined, suggestion
 
 
 def _choice(value: object, info: ValidationInfo) -> Choice:
     try:
         return Choice.read(value, (info.context or {}).get("folder"))
     except InputError as error:
-        expected = error.expected
-        if error.key == "measures" and isinstance(value, str):
-            expected = suggestion(value, MEASURES)
-        key = None if error.key == "measures" else error.key
-        raise invalid(error.problem, key=key, value=error.value, expected=expected) from error
+        if error.key != "measures":
+            raise ValueError(error.problem) from error
+        # The key of the whole list is the caller's to name.
+        expected = suggestion(value, MEASURES) if isinstance(value, str) else error.expected
+        placed = InputError(error.problem, value=error.value, expected=expected)
+        raise ValueError(error.problem) from placed
 
 
 class _MeasureSchema:

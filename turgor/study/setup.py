@@ -37,7 +37,7 @@ class Setup(StrictModel):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise explain(error, data) from None
+            raise explain(error, data, cls) from None
 
     def check(self, mesh: Mesh) -> None:
         """Refuse a surface, cavity, region or curve that the mesh does not have.

@@ -74,6 +74,6 @@ def read_tests(data: str | Path | Sequence[str | Path], **specimen: Any) -> list
     try:
         case = SpecimenCase.model_validate(said)
     except ValidationError as error:
-        raise explain(error, said) from None
+        raise explain(error, said, SpecimenCase) from None
     files = [data] if isinstance(data, (str, Path)) else data
     return [test for file in files for test in case.read(file)]

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from turgor.common.errors import InputError
+from turgor.common.findings import what_fits, what_is_missing
 
 
 class StrictModel(BaseModel):
@@ -46,13 +47,24 @@ def inlined(schema: Any, parts: Mapping[str, Any]) -> Any:
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Say which of the `known` names was probably meant, or list them all."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(name, names, n=max(1, len(names)))
+    nearest = sorted(other for other in close if _likeness(name, other) == _likeness(name, close[0]))
     listing = ", ".join(names) if names else "nothing"
-    return f"'{close[0]}' (of: {listing})" if close else f"one of: {listing}"
+    if not 1 <= len(nearest) <= _MOST_NAMED:
+        return f"one of: {listing}"
+    return f"{' or '.join(repr(other) for other in nearest)} (of: {listing})"
 
 
-def explain(error: ValidationError, data: object) -> InputError:
-    """Turn the first of pydantic's findings about `data` into an InputError without its file."""
+_MOST_NAMED = 3
+"""Of names that are as near to the one that is wrong; more of them are only listed."""
+
+
+def _likeness(name: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, other, name).ratio()
+
+
+def explain(error: ValidationError, data: object, model: type[BaseModel]) -> InputError:
+    """Turn the first of pydantic's findings about `data`, read as a `model`, into an InputError without its file."""
     findings = error.errors(include_url=False)
     # A misspelt key is also a missing one, and a list whose item is wrong is also too short: the cause comes first.
     findings.sort(key=lambda finding: finding["type"] in {"missing", "too_short"})
@@ -63,6 +75,8 @@ def explain(error: ValidationError, data: object) -> InputError:
     if isinstance(original, InputError):
         return under(original, key) if key else original
     problem, value, expected = _words(finding)
+    if finding["type"] == "missing":
+        expected = what_is_missing(model, finding["loc"])
     return InputError(problem, key=key or None, value=value, expected=expected)
 
 
@@ -96,7 +110,7 @@ def collected(key: str | None = None) -> Iterator[None]:
 def _words(finding: ErrorDetails) -> tuple[str, object, str | None]:
     """Return the problem, the value to show (``None``: nothing) and what would be right."""
     context = finding.get("ctx", {})
-    kind, value, message = finding["type"], finding["input"], finding["msg"]
+    kind, value = finding["type"], finding["input"]
     if kind == "unknown_key":
         return "unknown key", None, context["expected"]
     if kind == "extra_forbidden":
@@ -113,28 +127,7 @@ def _words(finding: ErrorDetails) -> tuple[str, object, str | None]:
         problem = f"this has {found} of at least {least} entries" if found else "this is empty"
         return problem, None, f"at least {'one entry' if least == 1 else f'{least} entries'}"
     problem = "this key has no value" if value is None else "this value does not fit"
-    return problem, value, _EXPECTED.get(kind) or context.get("expected") or _rest(message)
-
-
-_EXPECTED = {
-    "model_type": "'key: value' lines",
-    "model_attributes_type": "'key: value' lines",
-    "union_tag_not_found": "'key: value' lines",
-    "dict_type": "'key: value' lines",
-    "tuple_type": "a list",
-    "string_type": "text",
-    "string_too_short": "text that is not empty",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "bool_parsing": "true or false",
-    "bool_type": "true or false",
-}
-"""What would be right, in the user's words, for pydantic's kinds of findings."""
-
-
-def _rest(message: str) -> str:
-    return message.removeprefix("Input should be ").removeprefix("Value error, ")
+    return problem, value, what_fits(finding)
 
 
 def _tag_key(finding: ErrorDetails) -> str:

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from turgor.common.errors import InputError
+from turgor.common.findings import what_fits, what_is_missing
 from turgor.results.stored import Body, ModelKind, StoredState
 
 FloatArray = npt.NDArray[np.float64]
@@ -301,18 +302,14 @@ def _input_error(entry: Measure, error: ValidationError) -> InputError:
         known = ", ".join(entry.parameters.model_fields) or "no parameters"
         return InputError("unknown key", key=key, expected=f"one of: {known}")
     if found["type"] == "missing":
-        return InputError("this key is missing", key=key)
+        return InputError("this key is missing", key=key, expected=what_is_missing(entry.parameters, found["loc"]))
     cause = found.get("ctx", {}).get("error")
     refused = getattr(cause, "__cause__", None)
     if isinstance(refused, InputError):
         return InputError(refused.problem, key=key, value=refused.value, expected=refused.expected)
     if cause is not None:
         return InputError(str(cause), key=key)
-    return InputError("this value does not fit", key=key, value=found["input"], expected=_words(found["msg"]))
-
-
-def _words(message: str) -> str:
-    return message.removeprefix("Input should be ").removeprefix("Value error, ")
+    return InputError("this value does not fit", key=key, value=found["input"], expected=what_fits(found))
 
 
 def _listed(names: Iterable[str]) -> str:
