@@ -291,6 +291,19 @@ def test_what_it_snaps_to_is_not_the_limit_again(rise, full):
         assert abs(beyond.state.u[crown, 1] - limit.state.u[crown, 1]) > 0.3 * rise
 
 
+@pytest.mark.parametrize(
+    ("rise", "full", "top", "crown"), [(1.5, 4e-4, 1.99420e-4, -2.849), (2.0, 1e-3, 2.597e-4, -3.767)]
+)
+def test_what_it_snaps_to_is_found_where_the_volume_turns_on_the_way(rise, full, top, crown):
+    system = arch(full, rise=rise)
+    found = solve_path(system, [1.0], options=PathOptions(post_snap=True))
+    (_, limit), (event, snapped) = events(found)
+    assert (event, limit, snapped) == (Event.POST_SNAP, pytest.approx(top, rel=1e-3), limit)
+    # The same state is found from beyond: pressed through at a higher pressure, and let go to that of the limit.
+    assert found[1].stable
+    assert found[1].state.u[:, 1].min() == pytest.approx(crown, abs=2e-3)
+
+
 def test_friction_of_what_is_out_of_reach_hides_no_limit():
     def limit(friction: float) -> tuple[Event, float]:
         bare = arch(1.3 * LIMIT)

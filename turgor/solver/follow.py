@@ -13,16 +13,15 @@ import numpy as np
 from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
-from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.air import at_limit_of_air, limit_of_air
 from turgor.solver.apart import kept_apart
+from turgor.solver.arc import Arc
 from turgor.solver.choice import make_stiffness_solver
-from turgor.solver.control import Air, AlongTangent, ArcLength, Control, Quantity, Volume
+from turgor.solver.control import Air, Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.path import PathOptions
-from turgor.solver.prediction import predicted
 from turgor.solver.stiffness import StiffnessSolver
 from turgor.solver.stops import ALONG_THE_ARC, out_of_reach, stopped
 from turgor.solver.tally import Tally
@@ -167,7 +166,7 @@ def follow_arc(
     if start is None and system.loading.acts_at_start:
         post.send(walk.here)
     parts = math.ceil(length / options.largest_step)
-    arc = _Arc(walk, sign, scale, length / parts, before)
+    arc = Arc(walk, sign, scale, length / parts, before)
     taken = 0
     with _telling_why(walk, post):
         while sign * (target - walk.measure(walk.here)) > _rounding(target):
@@ -199,106 +198,6 @@ def follow_arc(
                 post.send_once(walk.here)
         post.send_once(walk.here)
     return post.sent
-
-
-def _cut(walk: VolumeWalk, beyond: Equilibrium, target: float) -> Equilibrium:
-    """Return the state at a volume between the one where the walk stands and one beyond.
-
-    Between the two the path is as good as straight. The walk goes on standing where it stands.
-    """
-    here, before = walk.here, walk.before
-    walk.stand_at(beyond, here, before)
-    try:
-        return walk.at(target)
-    finally:
-        walk.stand_at(here, before)
-
-
-class _Arc:
-    """Steps of a given length in the plane of volume and load fraction, each in the direction of the last one."""
-
-    def __init__(
-        self, walk: VolumeWalk, sign: float, scale: float, length: float, before: Equilibrium | None = None
-    ) -> None:
-        self.walk, self.scale, self.length = walk, scale, length
-        here = walk.here
-        assert here.compliance is not None
-        # The path sets out along the tangent, dQ/df being the compliance.
-        way = np.array([here.compliance / scale, 1.0])
-        ahead = sign * np.sign(way[0]) if before is None else walk.heading(before)
-        self.direction = ahead * way / np.linalg.norm(way)
-        walk.stand_at(here, before)
-
-    def advance_to(self, target: float, sign: float) -> Equilibrium | None:
-        """Return the next state, that at a volume where a step would pass it; ``None`` where even short steps fail."""
-        length, direction = self.length, self.direction
-        while (found := self.advance(length)) is not None and sign * (self.walk.measure(found) - target) > 0.0:
-            try:
-                return _cut(self.walk, found, target)
-            except NotConvergedError as error:
-                self.walk.failure = error
-                self.direction = direction
-                length *= 0.5
-        return found
-
-    def advance(self, length: float) -> Equilibrium | None:
-        """Return the state behind a step of at most a length, or ``None`` where even short steps find none."""
-        here = self.walk.here
-        while length >= self.walk.smallest_part * self.length:
-            try:
-                found = self._at(length)
-            except NotConvergedError as error:
-                log.info("arc-length step failed: %s", error.reason)
-                self.walk.failure = error
-                length *= 0.5
-                continue
-            way = self._way(found)
-            if float(way @ self.direction) <= 0.0:
-                log.info("arc-length step turned back")
-                length *= 0.5
-                continue
-            if self.is_flat(here, found) and self.walk.is_doubtful(found, length / self.length):
-                length *= 0.5
-                continue
-            self.direction = way / np.linalg.norm(way)
-            return found
-        return None
-
-    def is_flat(self, first: Equilibrium, second: Equilibrium) -> bool:
-        """Whether the volume goes on in its direction between two states: then it is the load that may turn."""
-        way = self._way(second, first)
-        tangents = [np.array([e.compliance / self.scale, 1.0]) for e in (first, second) if e.compliance is not None]
-        (before, _), (after, _) = (tangent * np.sign(tangent @ way) for tangent in tangents)
-        return bool(before * after > 0.0)
-
-    def _at(self, length: float) -> Equilibrium:
-        walk = self.walk
-        here, before = walk.here, walk.before
-        guess, aim = here.state, here.fraction + length * float(self.direction[1])
-        place, weights = (walk.measure(here), here.fraction, self.scale), walk.quantity.weights
-        if before is None:
-            found = self._found(AlongTangent(*place, length, weights, tangent=self.direction), guess, aim)
-            guess, aim = found.state, found.fraction
-        else:
-            reach = length / float(np.linalg.norm(self._way(here, before)))
-            guess, part = predicted(walk.system, (-1.0, 0.0), (before.state, here.state), reach)
-            if part > 0.0:
-                aim = here.fraction + part * reach * (here.fraction - before.fraction)
-        return self._found(ArcLength(*place, length, weights), guess, aim)
-
-    def _found(self, control: Control, guess: State, aim: float) -> Equilibrium:
-        walk = self.walk
-
-        def find(state: State) -> Equilibrium:
-            return find_equilibrium(walk.system, walk.linear, state, aim, walk.options, control=control)
-
-        return kept_apart(walk.system, find, guess)
-
-    def _way(
-        self, to: Equilibrium, since: Equilibrium | None = None
-    ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        since = since or self.walk.here
-        return np.array([(self.walk.measure(to) - self.walk.measure(since)) / self.scale, to.fraction - since.fraction])
 
 
 class _Post:

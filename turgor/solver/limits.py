@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.solver.apart import kept_apart
+from turgor.solver.arc import Arc
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.stops import Facts, at_limit, worst_point
@@ -19,6 +21,11 @@ log = logger("solver")
 
 SNAP_STEPS = 60
 """Steps that the walk along the falling branch may take."""
+
+ARC_STEP = 0.1
+"""Length of a step along the arc behind a limit, in parts of the way to it; longer ones leave winding paths."""
+
+ARC_STEPS = 300
 
 MOST_VOLUMES = 1000.0
 """Growth of the volume beyond which no rubber goes: tenfold stretch in every direction of a wall."""
@@ -47,18 +54,16 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         If the branch does not rise to the limit again as far as it could be followed.
     """
     goal = limit.equilibrium.fraction
-    walk.stand_at(beyond, limit.equilibrium)
     rest = abs(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights))
     previous, lowest = beyond, beyond.fraction
     ended = f"after {SNAP_STEPS} steps"
-    for found in itertools.islice(walk, SNAP_STEPS):
+    for found, by_volume in _behind(walk, limit, beyond):
         tally.count(found)
-        walk.first_step = max(walk.first_step, walk.step)  # the walk ends where steps must be so much shorter again
         log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
         if not knows_volume(walk.system, found.state):
             ended = "where surfaces begin to rub"
             break
-        if found.fraction >= goal:
+        if found.fraction >= goal and (by_volume or found.stable):
             try:
                 return replace(at_load(walk, goal, previous, found, tally), event=Event.POST_SNAP)
             except NotConvergedError as error:
@@ -69,9 +74,31 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
             ended = "at a volume that no rubber reaches"
             break
     else:
-        if walk.failure is not None and abs(walk.step) < abs(walk.first_step):
+        if walk.failure is not None:
             ended = f"where the walk ended ({walk.failure.reason})"
     raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, rest, ended))
+
+
+def _behind(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> Iterator[tuple[Equilibrium, bool]]:
+    """Yield the states behind a limit, and whether they are found by volume: along the arc where the volume turns."""
+    walk.stand_at(beyond, limit.equilibrium)
+    walk.failure = None
+    for found in itertools.islice(walk, SNAP_STEPS):
+        yield found, True
+        walk.first_step = max(walk.first_step, walk.step)  # the walk ends where steps must be so much shorter again
+    if walk.failure is None or walk.before is None:
+        return
+    log.info("behind the limit: on along the arc (%s)", walk.failure.reason)
+    rest = walk.quantity.value(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights), 0.0)
+    scale = abs(walk.measure(limit.equilibrium) - rest) / abs(limit.equilibrium.fraction)
+    arc = Arc(walk, 1.0, scale, ARC_STEP * abs(limit.equilibrium.fraction), walk.before)
+    for _ in range(ARC_STEPS):
+        here, before = walk.here, walk.before
+        state = arc.advance(arc.length)
+        if state is None:
+            return
+        walk.stand_at(state, here, before)
+        yield state, False
 
 
 def at_load(walk: VolumeWalk, goal: float, below: Equilibrium, above: Equilibrium, tally: Tally) -> Equilibrium:
