@@ -19,6 +19,7 @@ import pytest
 import yaml
 
 from turgor.common.errors import InputError
+from turgor.materials.library import find
 from turgor.results.archive import save_record
 from turgor.results.files import replacing
 from turgor.results.store import RunStore
@@ -33,6 +34,7 @@ class Watch:
         self.stages: list[str] = []
         self.told: list[str] = []
         self.warnings: list[str] = []
+        self.before_warnings: list[tuple[str, ...]] = []
         self.fractions: list[float] = []
         self.interrupt_after = interrupt_after
 
@@ -47,8 +49,8 @@ class Watch:
         self.told.append(text)
 
     def warn(self, text: str) -> None:
-        assert "mesh" not in self.stages, "too late"
         self.warnings.append(text)
+        self.before_warnings.append(tuple(self.stages))
 
     def advance(self, fraction: float, text: str) -> None:
         self.fractions.append(fraction)
@@ -227,16 +229,29 @@ def test_a_run_that_stops_short_keeps_what_it_reached(small_tube: Path, tmp_path
 @pytest.mark.usefixtures("unreported")
 def test_an_unstable_material_is_told_of_before_the_mesh(small_tube: Path, tmp_path: Path) -> None:
     unstable = "materials.body={library: tpu-0deg-mooney-rivlin-5}"
+    of_library = f"tpu-0deg-mooney-rivlin-5: {find('tpu-0deg-mooney-rivlin-5').unusable}"
     watch = Watch()
     done = run(load_case(small_tube, [unstable, "solver.steps=1"]), tmp_path / "run", progress=watch)
-    assert "materials.body: the material is unstable where the run may go (equibiaxial beyond" in watch.warnings[0]
-    assert watch.warnings[0] in (done.folder / "run.log").read_text(encoding="utf-8")
+    assert watch.warnings[0] == of_library
+    assert "materials.body: the material is unstable where the run may go (equibiaxial beyond" in watch.warnings[1]
+    assert watch.warnings[1] in (done.folder / "run.log").read_text(encoding="utf-8")
+    assert all("mesh" not in stages for stages in watch.before_warnings), "too late"
     watch = Watch()
     run(load_case(small_tube, [unstable, "solver.steps=1", "largest_stretch=1.04"]), tmp_path / "2", progress=watch)
-    assert watch.warnings == []
+    assert watch.warnings == [of_library]
     watch = Watch()
     run(load_case(small_tube, ["solver.steps=1"]), tmp_path / "3", progress=watch)
     assert watch.warnings == []
+
+
+@pytest.mark.usefixtures("unreported")
+def test_what_is_doubtful_about_the_system_is_told_on_the_way(small_tube: Path, tmp_path: Path) -> None:
+    pressing = "contact={bodies: [{type: plane, point: [0 mm, 0 mm, 39.9 mm], normal: [0, 0, -1]}]}"
+    watch = Watch()
+    done = run(load_case(small_tube, [pressing, "solver.steps=1"]), tmp_path / "run", progress=watch)
+    (warning,) = watch.warnings
+    assert warning.startswith("contact.bodies.0: at rest 'plane' presses already, 0.1 mm deep")
+    assert warning in (done.folder / "run.log").read_text(encoding="utf-8")
 
 
 TABLE = "{type: plane, name: table, point: [0 mm, 0 mm, 40.2 mm], normal: [0, 0, -1], surface: tip-face}"

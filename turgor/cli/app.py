@@ -249,7 +249,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write a case as a model that another program runs: mesh, materials, supports, loads and states."""
-    with naming(case_file, changes or ()):
+    with naming(case_file, changes or ()), telling_warnings():
         case = tg.load_case(case_file, changes or ())
         path = out or Path(f"{case.name}.inp")
         tg.check_targets([path], [case_file, *case.files_read])

@@ -118,8 +118,9 @@ def run(
     if stored and not (resume or overwrite):
         expected = "another folder, or resume (--resume) or overwrite (--overwrite)"
         raise InputError("the folder holds a run already", file=place, expected=expected)
-    with RunLog() as run_log:
-        return _Running(case, place, files, progress or Silent(), run_log).run(continues=stored and resume)
+    show = progress or Silent()
+    with RunLog(show.warn) as run_log:
+        return _Running(case, place, files, show, run_log).run(continues=stored and resume)
 
 
 class _Running:
@@ -138,7 +139,6 @@ class _Running:
         check_sizes(self.case, materials)
         for text in doubts(self.case, materials):
             log.warning(text)
-            self.show.warn(text)
         with self._resumed() if continues else nullcontext() as stored:
             mesh = stored.mesh if stored else self._meshed()
             self.show.stage("system")
@@ -260,7 +260,6 @@ class _Running:
             if text is not None and kind not in self._doubted:
                 self._doubted.add(kind)
                 log.warning(text)
-                self.show.warn(text)
 
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
         self.show.note(f"to {100.0 * fraction:.4g} % of the load: iteration {iteration}, residual {residual:.1e}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from logging.handlers import MemoryHandler
 from pathlib import Path
 from typing import Self
@@ -18,10 +19,16 @@ class RunLog:
     """Collects the package's log; :meth:`write_to` sends it, and what follows, to a file.
 
     The first stages of a run come before its folder may be touched, hence the detour over memory.
+
+    Parameters
+    ----------
+    warn
+        Told each warning, but for those of the solver on its way, whose results say what came of it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, warn: Callable[[str], None]) -> None:
         self._logger = logging.getLogger(LOGGER_NAME)
+        self._relay = _Relay(warn)
         self._memory = MemoryHandler(_CAPACITY, flushLevel=logging.CRITICAL + 1, flushOnClose=False)
         self._file: logging.FileHandler | None = None
 
@@ -29,6 +36,7 @@ class RunLog:
         self._level = self._logger.level
         self._logger.setLevel(logging.INFO)
         self._logger.addHandler(self._memory)
+        self._logger.addHandler(self._relay)
         return self
 
     def write_to(self, path: Path, *, append: bool) -> None:
@@ -48,8 +56,18 @@ class RunLog:
         self._logger.addHandler(self._file)
 
     def __exit__(self, *failure: object) -> None:
-        for handler in (self._memory, self._file):
+        for handler in (self._relay, self._memory, self._file):
             if handler is not None:
                 self._logger.removeHandler(handler)
                 handler.close()
         self._logger.setLevel(self._level)
+
+
+class _Relay(logging.Handler):
+    def __init__(self, warn: Callable[[str], None]) -> None:
+        super().__init__(logging.WARNING)
+        self._warn = warn
+        self.addFilter(lambda record: record.name != f"{LOGGER_NAME}.solver")
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._warn(record.getMessage())
