@@ -227,13 +227,8 @@ class _Walk:
         except NotConvergedError as error:
             log.info("step to %.4g failed: %s", aim, error.reason)
             return self._failed(size, target, error)
-        if found.stable is False and self.here.stable is not False and size > 4 * self.options.smallest_step:
-            # A long step can land on an unstable branch that a shorter one would not have met.
-            log.info("step to %.4g ended in an unstable equilibrium; trying a shorter one", aim)
-            self.step = CUT * size
-            return None
-        if size > 4 * self.options.smallest_step and self.system.have_passed(self.here.state, found.state):
-            log.info("on the step to %.4g surfaces passed into each other; trying a shorter one", aim)
+        if size > 4 * self.options.smallest_step and (where := self._led_astray(found)):
+            log.info("step to %.4g ended %s; trying a shorter one", aim, where)
             self.step = CUT * size
             return None
         if self._may_have_jumped(found):
@@ -242,6 +237,14 @@ class _Walk:
         if found.factorisations <= EASY:
             self.step = min(max(self.step, GROWTH * size), self.options.largest_step)
         return found
+
+    def _led_astray(self, found: Equilibrium) -> str | None:
+        """Say where a long step has ended, if it is where a shorter one might not have."""
+        if found.stable is False and self.here.stable is not False:
+            return "in an unstable equilibrium"
+        if self.system.have_passed(self.here.state, found.state):
+            return "where surfaces have passed into each other"
+        return None
 
     def _bifurcated(self, found: Equilibrium) -> Equilibrium:
         """Mark the first state behind a bifurcation: the inertia has changed, and the load has no limit there."""
