@@ -65,6 +65,14 @@ def what_is_missing(model: type[BaseModel], place: Sequence[str | int]) -> str |
     return f"{wanted}{example}" if wanted else None
 
 
+def what_types(model: type[BaseModel], place: Sequence[str | int]) -> str | None:
+    """Return the tags that the alternatives at a place of a model are told apart by; ``None`` without any."""
+    schema = model.model_json_schema()
+    nodes = _reached(schema, place, schema.get("$defs", {}))
+    tags = next((list(node["discriminator"]["mapping"]) for node in nodes if "discriminator" in node), None)
+    return f"one of: {', '.join(sorted(tags))}" if tags else None
+
+
 def _reached(node: Mapping[str, Any], place: Sequence[str | int], parts: Mapping[str, Any]) -> Iterator[Any]:
     """Yield what a JSON Schema says at a place; alternatives that have it one after the other."""
     if "$ref" in node:

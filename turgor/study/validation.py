@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from turgor.common.errors import InputError
-from turgor.common.findings import what_fits, what_is_missing
+from turgor.common.findings import what_fits, what_is_missing, what_types
 
 
 class StrictModel(BaseModel):
@@ -77,6 +77,8 @@ def explain(error: ValidationError, data: object, model: type[BaseModel]) -> Inp
     problem, value, expected = _words(finding)
     if finding["type"] == "missing":
         expected = what_is_missing(model, finding["loc"])
+    elif finding["type"] == "union_tag_not_found":
+        expected = what_types(model, finding["loc"]) or expected
     return InputError(problem, key=key or None, value=value, expected=expected)
 
 
