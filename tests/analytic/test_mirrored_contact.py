@@ -92,7 +92,7 @@ def test_derivatives_behind_the_plane(kind):
     sunk = system.consistent(state.u - [0.0, 0.0, 0.6], state.loads)
     check_contact(mirror, sunk)
     # The image is as high above the plane as the lowest point of the sides is below it.
-    lowest = (mirror.skin.shape @ (mesh.points + sunk.u)[mirror.skin.faces])[:, :, 2].min()
+    lowest = (mirror.skin.shape @ (mesh.points + sunk.u)[mirror.faces])[:, :, 2].min()
     assert mirror.touch(sunk).overlap == pytest.approx(-2.0 * lowest, rel=1e-12)
 
 

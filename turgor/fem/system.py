@@ -15,8 +15,9 @@ from turgor.fem.bending import FibreBending
 from turgor.fem.cavity import Cavity
 from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
+from turgor.fem.contact.mirror import mirrors
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
-from turgor.fem.contact.spec import ContactCase, RigidContact, led, make_contact, mirrors
+from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact, led, make_contact
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -422,7 +423,8 @@ class System:
             channel = next(channels) if isinstance(case, RigidContact) and case.is_load else None
             row = next(rows) if isinstance(case, RigidContact) and case.is_unknown else None
             found.append(make_contact(self.mesh, materials, case, pressure, channel, self.section, number, row))
-        return [*found, *mirrors(self.mesh, materials, cases, pressure, self.section)]
+        own = [contact for case, contact in zip(cases, found, strict=True) if isinstance(case, SelfContact)]
+        return [*found, *(mirror for contact in own for mirror in mirrors(self.mesh, contact))]
 
     @property
     def _rest(self) -> Floats:

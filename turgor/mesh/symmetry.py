@@ -33,11 +33,14 @@ class SymmetryPlane:
         Unit normal out of the body, ``(d,)``.
     faces
         The faces that lie in it, ``(k, n)``.
+    off
+        How far what lies in it may be off it, mm.
     """
 
     point: FloatArray
     normal: FloatArray
     faces: IntArray
+    off: float
 
     def height(self, places: FloatArray) -> FloatArray:
         """Return how far `places` ``(..., d)`` are in front of the plane, on the body's side, mm."""
@@ -57,5 +60,5 @@ def planes_of_symmetry(mesh: Mesh) -> Iterator[SymmetryPlane]:
         looks_alike = normals @ normals[largest] >= _PARALLEL * sizes * sizes[largest]
         here = looks_alike & (np.abs((middles - middles[largest]) @ normals[largest]) <= off * sizes[largest])
         normal = normals[here].sum(axis=0)
-        yield SymmetryPlane(middles[largest], normal / np.linalg.norm(normal), faces[here])
+        yield SymmetryPlane(middles[largest], normal / np.linalg.norm(normal), faces[here], off)
         faces = faces[~here]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from turgor.common.errors import InputError
 from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.skin import STIFFNESS, Skin
-from turgor.fem.contact.term import GROWTH_OF_OVERLAP, Touch
+from turgor.fem.contact.term import GROWTH_OF_OVERLAP, Contact, Touch
 from turgor.fem.pattern import packed_size
 from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
@@ -18,9 +18,6 @@ from turgor.mesh.symmetry import SymmetryPlane, planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-
-IN_PLANE = 1e-3
-"""Part of the body's extent by which what lies in a plane may be off it."""
 
 SAMPLES = 200
 ALIKE = 1e-6
@@ -37,7 +34,9 @@ class Mirror(Unlagged):
     Parameters
     ----------
     skin
-        The faces that may touch their image; none in the plane.
+        The skin.
+    front
+        Those of its faces that may touch their image, ``(k,)``; none in the plane.
     plane
         The plane of symmetry.
     name
@@ -47,9 +46,12 @@ class Mirror(Unlagged):
     nodes = NO_NODES
     friction = 0.0
 
-    def __init__(self, skin: Skin, plane: SymmetryPlane, name: str) -> None:
+    def __init__(self, skin: Skin, front: Ints, plane: SymmetryPlane, name: str) -> None:
         self.skin = skin
         self.name = name
+        self.faces, self._area = skin.faces[front], skin.area[front]
+        self._wall, self._depth = skin.wall[front, None], skin.depth[front, None]
+        self._hardness = STIFFNESS * (skin.load / skin.grip)[front, None] * self._area
         self._inward = -plane.normal
         self._height = plane.height(skin.points[:, : skin.dimension])
 
@@ -61,7 +63,7 @@ class Mirror(Unlagged):
         """Add the contact forces, N."""
         force = (self._stiffness(state) * np.minimum(self._heights(state.u), 0.0)) @ self.skin.shape
         touching = np.flatnonzero(force.any(axis=1))
-        add_at_nodes(self.skin.faces[touching], force[touching][:, :, None] * self._inward, out)
+        add_at_nodes(self.faces[touching], force[touching][:, :, None] * self._inward, out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill nothing: all of the stiffness is in :meth:`blocks`."""
@@ -76,16 +78,16 @@ class Mirror(Unlagged):
         rows = full.shape[1] * full.shape[2]
         packed = np.empty((len(touching), packed_size(rows)))
         pack_symmetric(full.reshape(len(touching), rows, rows), packed)
-        return self.skin.faces[touching], packed
+        return self.faces[touching], packed
 
     def couplings(self, u: Floats) -> Ints:
         """Return nothing: the nodes of a face are coupled anyway."""
         del u
-        return self.skin.faces[:0]
+        return self.faces[:0]
 
     def longest_step(self, state: State, du: Floats) -> float:
         """Return the part of the step `du` up to which no overlap grows too much."""
-        room = np.maximum(self._heights(state.u), 0.0) + 0.5 * GROWTH_OF_OVERLAP * self.skin.depth[:, None]
+        room = np.maximum(self._heights(state.u), 0.0) + 0.5 * GROWTH_OF_OVERLAP * self._depth
         rate = self._at_points((du @ self._inward)[: len(self._height)])
         return 1.0 / max(1.0, float((-rate / room).max()))
 
@@ -95,9 +97,9 @@ class Mirror(Unlagged):
         overlap = 2.0 * np.maximum(-height, 0.0)
         return Touch(
             self.name,
-            area=float(self.skin.area[height < 0.0].sum()),
+            area=float(self._area[height < 0.0].sum()),
             overlap=float(overlap.max()),
-            overlap_per_wall=float((overlap / self.skin.wall[:, None]).max()),
+            overlap_per_wall=float((overlap / self._wall).max()),
         )
 
     def intersects(self, state: State) -> None:
@@ -114,30 +116,35 @@ class Mirror(Unlagged):
         return self._at_points(self._height + (u @ self._inward)[: len(self._height)])
 
     def _at_points(self, at_nodes: Floats) -> Floats:
-        return np.asarray(at_nodes[self.skin.faces] @ self.skin.shape.T)
+        return np.asarray(at_nodes[self.faces] @ self.skin.shape.T)
 
     def _stiffness(self, state: State) -> Floats:
-        return np.asarray(2.0 * state.penalty * STIFFNESS * (self.skin.load / self.skin.grip)[:, None] * self.skin.area)
+        return np.asarray(2.0 * state.penalty * self._hardness)
 
 
-def in_front(mesh: Mesh, plane: SymmetryPlane, faces: Ints) -> Ints:
-    """Return the faces that do not lie in a plane of symmetry.
+def mirrors(mesh: Mesh, contact: Contact) -> list[Mirror]:
+    """Return what a body that may meet itself does at its planes of symmetry, also by the barrier a penalty.
+
+    Points in such a plane are at no distance from it, which a barrier cannot hold.
 
     Raises
     ------
     InputError
-        If the body reaches through the plane, so that behind it is no mirror image.
+        If the body reaches through one of the planes, so that behind it is no mirror image.
     """
-    height = plane.height(mesh.points)
-    off = IN_PLANE * float(np.ptp(mesh.points, axis=0).max())
-    if height.min() < -off:
-        raise InputError(
-            "the body reaches through its plane of symmetry, so that it cannot meet its mirror image",
-            key="contact",
-            value=f"{-height.min():.4g} mm behind it at {mesh.points[height.argmin()].round(3).tolist()} mm",
-            expected="a body on one side of each surface 'symmetry…', or another name of the surface",
-        )
-    return faces[(height[faces] > off).any(axis=1)]
+    found = []
+    for k, plane in enumerate(planes_of_symmetry(mesh), 1):
+        height = plane.height(mesh.points)
+        if height.min() < -plane.off:
+            raise InputError(
+                "the body reaches through its plane of symmetry, so that it cannot meet its mirror image",
+                key="contact",
+                value=f"{-height.min():.4g} mm behind it at {mesh.points[height.argmin()].round(3).tolist()} mm",
+                expected="a body on one side of each surface 'symmetry…', or another name of the surface",
+            )
+        front = np.flatnonzero((height[contact.skin.faces] > plane.off).any(axis=1)).astype(np.int32)
+        found.append(Mirror(contact.skin, front, plane, f"{contact.name}:mirror" + (f"-{k}" if k > 1 else "")))
+    return found
 
 
 def cut_across(body: RigidBody, motion: Floats, mesh: Mesh) -> Floats:

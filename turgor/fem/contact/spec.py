@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -13,7 +13,7 @@ from turgor.common.errors import InputError
 from turgor.common.rows import row_numbers
 from turgor.fem.contact.barrier import REACH, Barrier
 from turgor.fem.contact.hull import hull
-from turgor.fem.contact.mirror import Mirror, cut_across, in_front
+from turgor.fem.contact.mirror import cut_across
 from turgor.fem.contact.obstacle import Obstacle
 from turgor.fem.contact.skin import Skin
 from turgor.fem.contact.surfaces import SurfaceContact
@@ -23,7 +23,6 @@ from turgor.fem.section import Axisymmetric, Section, in_section, on_axis
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.symmetry import planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -155,7 +154,8 @@ def make_contact(
     number: int = 0,
     node: int | None = None,
 ) -> Contact:
-    """Return the term of a contact; of one with itself without what it does at planes of symmetry (:func:`mirrors`).
+    """Return the term of a contact; of one with itself without what it does at planes of symmetry
+    (:func:`turgor.fem.contact.mirror.mirrors`).
 
     Parameters
     ----------
@@ -195,28 +195,6 @@ def make_contact(
     if barrier:
         return Barrier(skin, group, case.name, section)
     return SurfaceContact(skin, group, case.name, case.friction, number)
-
-
-def mirrors(
-    mesh: Mesh,
-    materials: Mapping[str, Hyperelastic],
-    contact: Sequence[ContactCase],
-    pressure: float,
-    section: Section | None,
-) -> list[Mirror]:
-    """Return what a body that may meet itself does at its planes of symmetry, also by the barrier a penalty.
-
-    Points in such a plane are at no distance from it, which a barrier cannot hold. Parameters as of
-    :func:`make_contact`; InputError is raised if the body reaches through one of the planes.
-    """
-    found: list[Mirror] = []
-    for case in contact:
-        if isinstance(case, SelfContact):
-            for k, plane in enumerate(planes_of_symmetry(mesh), 1):
-                faces = in_front(mesh, plane, _whole(mesh, section))
-                skin = Skin(mesh, faces, materials, pressure, section)
-                found.append(Mirror(skin, plane, f"{case.name}:mirror" + (f"-{k}" if k > 1 else "")))
-    return found
 
 
 def led(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[Floats, bool]:

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from turgor.fem.contact.skin import Skin
 from turgor.fem.state import State
 from turgor.fem.term import Term, Triple
 
@@ -72,6 +73,7 @@ class Contact(Term, Protocol):
 
     name: str
     friction: float
+    skin: Skin
 
     def blocks(self, state: State, lagged: Floats) -> tuple[Ints, Floats]:
         """Return the nodes ``(n_blocks, nodes_per_block)`` coupled now and their packed stiffnesses."""
