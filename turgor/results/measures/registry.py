@@ -218,7 +218,7 @@ def check(choices: Sequence[Choice], body: Body) -> None:
     rest = body.at_rest()
     for choice in choices:
         entry = choice.entry
-        _check_possible(entry, body)
+        _check_there(entry, body)
         try:
             choice.of(rest)
         except InputError as error:
@@ -238,7 +238,8 @@ def evaluate(choices: Iterable[Choice | str], state: StoredState) -> dict[str, f
     """
     values: dict[str, float] = {}
     for choice in map(Choice.read, choices):
-        _check_possible(choice.entry, state.body)
+        _check_kind(choice.entry, state.body.kind)
+        _check_there(choice.entry, state.body)
         if not choice.entry.is_curve:
             values |= {key: float(number) for key, number in zip(choice.keys, choice.of(state), strict=True)}
     return values
@@ -282,8 +283,7 @@ def _check_kind(entry: Measure, kind: ModelKind) -> None:
         raise InputError(problem, key="measures", expected=expected)
 
 
-def _check_possible(entry: Measure, body: Body) -> None:
-    _check_kind(entry, body.kind)
+def _check_there(entry: Measure, body: Body) -> None:
     missing = entry.missing(body)
     if missing:
         there = f"surfaces {_listed(body.mesh.surfaces)}; markers {_listed(body.mesh.markers)}"
