@@ -24,7 +24,17 @@ from turgor.solver.prediction import predicted
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.tangent import factorise_tangent
-from turgor.solver.volume import CUT, EASY, LimitPoint, VolumeWalk, compliance, is_monotone, knows_volume, softest_mode
+from turgor.solver.volume import (
+    CUT,
+    EASY,
+    FEW_CUTS,
+    LimitPoint,
+    VolumeWalk,
+    compliance,
+    is_monotone,
+    knows_volume,
+    softest_mode,
+)
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
@@ -227,7 +237,7 @@ class _Walk:
         except NotConvergedError as error:
             log.info("step to %.4g failed: %s", aim, error.reason)
             return self._failed(size, target, error)
-        if size > 4 * self.options.smallest_step and (where := self._led_astray(found)):
+        if size > FEW_CUTS * self.options.smallest_step and (where := self._led_astray(found)):
             log.info("step to %.4g ended %s; trying a shorter one", aim, where)
             self.step = CUT * size
             return None

@@ -195,10 +195,12 @@ class VolumeWalk:
         if part > SHORT_ENOUGH and self._may_hide_limits(found):
             log.info("the step may hide limits")
             return True
-        if self.loses_stability(self.here, found) and part > FEW_CUTS * self.smallest_part:
+        if part <= FEW_CUTS * self.smallest_part:
+            return False
+        if self.loses_stability(self.here, found):
             log.info("the step ended in an unstable state")
             return True
-        if part > FEW_CUTS * self.smallest_part and self.system.have_passed(self.here.state, found.state):
+        if self.system.have_passed(self.here.state, found.state):
             log.info("on the step surfaces passed into each other")
             return True
         return False
