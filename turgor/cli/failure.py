@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 import turgor as tg
 from turgor.cli.output import leave_standard_output
+from turgor.common.log import LOGGER_NAME, Relay
 
 _CommandLineError: type[Exception] = typer.BadParameter.__bases__[0]
 """What typer raises, and words itself, for a command line that is not well formed."""
@@ -94,18 +95,13 @@ def naming(file: Path, changes: Iterable[str] = ()) -> Iterator[None]:
 @contextlib.contextmanager
 def telling_warnings() -> Iterator[None]:
     """Print the package's warnings on standard error while this lasts."""
-    handler = _Teller(logging.WARNING)
-    log = logging.getLogger("turgor")
+    handler = Relay(tell)
+    log = logging.getLogger(LOGGER_NAME)
     log.addHandler(handler)
     try:
         yield
     finally:
         log.removeHandler(handler)
-
-
-class _Teller(logging.Handler):
-    def emit(self, record: logging.LogRecord) -> None:
-        tell(record.getMessage())
 
 
 def tell(message: str) -> None:

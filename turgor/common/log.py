@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 LOGGER_NAME = "turgor"
 
@@ -13,3 +14,17 @@ def logger(room: str) -> logging.Logger:
     if not root.handlers:
         root.addHandler(logging.NullHandler())
     return root.getChild(room)
+
+
+class Relay(logging.Handler):
+    """Tells somebody each warning of the package, but for those of some rooms."""
+
+    def __init__(self, tell: Callable[[str], None], *, but: tuple[str, ...] = ()) -> None:
+        super().__init__(logging.WARNING)
+        self._tell = tell
+        silent = {f"{LOGGER_NAME}.{room}" for room in but}
+        self.addFilter(lambda record: record.name not in silent)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Tell the message."""
+        self._tell(record.getMessage())

@@ -8,7 +8,7 @@ from logging.handlers import MemoryHandler
 from pathlib import Path
 from typing import Self
 
-from turgor.common.log import LOGGER_NAME
+from turgor.common.log import LOGGER_NAME, Relay
 from turgor.common.writing import writing
 
 _FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
@@ -28,7 +28,7 @@ class RunLog:
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._logger = logging.getLogger(LOGGER_NAME)
-        self._relay = _Relay(warn)
+        self._relay = Relay(warn, but=("solver",))
         self._memory = MemoryHandler(_CAPACITY, flushLevel=logging.CRITICAL + 1, flushOnClose=False)
         self._file: logging.FileHandler | None = None
 
@@ -61,13 +61,3 @@ class RunLog:
                 self._logger.removeHandler(handler)
                 handler.close()
         self._logger.setLevel(self._level)
-
-
-class _Relay(logging.Handler):
-    def __init__(self, warn: Callable[[str], None]) -> None:
-        super().__init__(logging.WARNING)
-        self._warn = warn
-        self.addFilter(lambda record: record.name != f"{LOGGER_NAME}.solver")
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._warn(record.getMessage())
