@@ -54,10 +54,10 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         If the branch does not rise to the limit again as far as it could be followed.
     """
     goal = limit.equilibrium.fraction
-    rest = abs(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights))
+    rest = walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights)
     previous, lowest = beyond, beyond.fraction
     ended = f"after {SNAP_STEPS} steps"
-    for found, by_volume in _behind(walk, limit, beyond):
+    for found, by_volume in _behind(walk, limit, beyond, rest):
         tally.count(found)
         log.info("behind the limit: load %.5g at volume %.5g", found.fraction, walk.measure(found))
         if not knows_volume(walk.system, found.state):
@@ -70,17 +70,22 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
                 ended = f"and the state at the limit's loads was enclosed but not found ({error.reason})"
                 break
         previous, lowest = found, min(lowest, found.fraction)
-        if rest and abs(walk.measure(found)) > MOST_VOLUMES * rest:
+        if rest and abs(walk.measure(found)) > MOST_VOLUMES * abs(rest):
             ended = "at a volume that no rubber reaches"
             break
     else:
         if walk.failure is not None:
             ended = f"where the walk ended ({walk.failure.reason})"
-    raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, rest, ended))
+    raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, abs(rest), ended))
 
 
-def _behind(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> Iterator[tuple[Equilibrium, bool]]:
-    """Yield the states behind a limit, and whether they are found by volume: along the arc where the volume turns."""
+def _behind(
+    walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, rest: float
+) -> Iterator[tuple[Equilibrium, bool]]:
+    """Yield the states behind a limit, and whether they are found by volume: along the arc where the volume turns.
+
+    `rest` is the volume at rest, N mm.
+    """
     walk.stand_at(beyond, limit.equilibrium)
     walk.failure = None
     for found in itertools.islice(walk, SNAP_STEPS):
@@ -89,7 +94,6 @@ def _behind(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> Iterato
     if walk.failure is None or walk.before is None:
         return
     log.info("behind the limit: on along the arc (%s)", walk.failure.reason)
-    rest = walk.quantity.value(walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights), 0.0)
     scale = abs(walk.measure(limit.equilibrium) - rest) / abs(limit.equilibrium.fraction)
     arc = Arc(walk, 1.0, scale, ARC_STEP * abs(limit.equilibrium.fraction), walk.before)
     for _ in range(ARC_STEPS):

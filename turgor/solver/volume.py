@@ -335,8 +335,7 @@ class VolumeWalk:
     def _tangent(self, equilibrium: Equilibrium) -> Floats:
         """Return du/df along the path, ``(n_points, d)``."""
         factorise_tangent(self.system, self.linear, equilibrium.state)
-        force = self.system.free_part(self.system.load_direction(equilibrium.state, self.line.growth))
-        return self.system.nodal(-self.linear.solve(force))
+        return self.system.nodal(response(self.system, self.linear, equilibrium.state, self.line.growth))
 
     def is_stable(self, equilibrium: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
@@ -392,8 +391,12 @@ def stable_while_held(system: System, quantity: Quantity, equilibrium: Equilibri
 
 def compliance(system: System, linear: StiffnessSolver, state: State, weights: Floats | None, growth: Floats) -> float:
     """Return dQ/df along the path of equilibria, by the tangent that was factorised last; the loads' `growth` by f."""
-    response = linear.solve(system.free_part(system.load_direction(state, growth)))
-    return float(system.free_part(system.load_direction(state, weights)) @ response)
+    return -float(system.free_part(system.load_direction(state, weights)) @ response(system, linear, state, growth))
+
+
+def response(system: System, linear: StiffnessSolver, state: State, growth: Floats) -> Floats:
+    """Return du/df along the path ``(n_dofs,)``, by the tangent that was factorised last; the loads' `growth` by f."""
+    return -linear.solve(system.free_part(system.load_direction(state, growth)))
 
 
 def softest_mode(system: System, linear: StiffnessSolver, state: State, growth: Floats) -> Floats:
