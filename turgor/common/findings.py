@@ -52,8 +52,7 @@ def what_is_missing(model: type[BaseModel], place: Sequence[str | int]) -> str |
     place
         As pydantic tells it: keys, numbers of items, and tags of unions.
     """
-    schema = model.model_json_schema()
-    node = next(_reached(schema, place, schema.get("$defs", {})), None)
+    node = next(_nodes(model, place), None)
     if node is None:
         return None
     if "enum" in node:
@@ -67,10 +66,15 @@ def what_is_missing(model: type[BaseModel], place: Sequence[str | int]) -> str |
 
 def what_types(model: type[BaseModel], place: Sequence[str | int]) -> str | None:
     """Return the tags that the alternatives at a place of a model are told apart by; ``None`` without any."""
-    schema = model.model_json_schema()
-    nodes = _reached(schema, place, schema.get("$defs", {}))
-    tags = next((list(node["discriminator"]["mapping"]) for node in nodes if "discriminator" in node), None)
+    tagged = (node["discriminator"]["mapping"] for node in _nodes(model, place) if "discriminator" in node)
+    tags = next(tagged, None)
     return f"one of: {', '.join(sorted(tags))}" if tags else None
+
+
+def _nodes(model: type[BaseModel], place: Sequence[str | int]) -> Iterator[Any]:
+    """Return what the JSON Schema of a model says at a place, one alternative after the other."""
+    schema = model.model_json_schema()
+    return _reached(schema, place, schema.get("$defs", {}))
 
 
 def _reached(node: Mapping[str, Any], place: Sequence[str | int], parts: Mapping[str, Any]) -> Iterator[Any]:
