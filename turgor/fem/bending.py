@@ -37,7 +37,7 @@ class FibreBending(Unlagged):
     tangent a + b, and is turned about it as the material line that lay along it. So each joint depends on three
     vectors, the two bars and that line, all linear in the nodes of the cells around it; of a fibre that is
     straight at rest only the bars matter. Twist is free. The ends are free of moments; where the last end lies on
-    the first one the fibre is closed and has a joint there.
+    the first one the fibre is closed and has a joint there. In a plane of symmetry, as of E A, a part of E I counts.
 
     Parameters
     ----------
@@ -64,11 +64,13 @@ class FibreBending(Unlagged):
         carried = _carried_lines(mesh, mesh.cells[hosts], local, line)
         self.nodes, self._share = in_blocks(embedded.bars[first], embedded.bars[second], carried)
         self._rest = self._vectors(mesh.points)
-        self._stiffness = self.fibre.bending_stiffness / (0.5 * (length[first] + length[second]))
+        # Where a fibre leaves a plane of symmetry, it does so on both sides.
+        self._part = np.maximum(embedded.part[first], embedded.part[second])
+        self._stiffness = self._part * self.fibre.bending_stiffness / (0.5 * (length[first] + length[second]))
 
     def moment(self, u: Floats) -> Floats:
-        """Return the size of the bending moment at every joint at displacement `u`, ``(n_joints,)``, N mm."""
-        return np.asarray(self._stiffness * np.linalg.norm(self._curvature(u), axis=1))
+        """Return the size of the whole section's bending moment at every joint, ``(n_joints,)``, N mm."""
+        return np.asarray(self._stiffness / self._part * np.linalg.norm(self._curvature(u), axis=1))
 
     def energy(self, state: State) -> float:
         """Return the bending energy, N mm."""

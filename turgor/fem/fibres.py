@@ -16,6 +16,7 @@ from turgor.fem.locate import locate
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.symmetry import planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -75,6 +76,9 @@ class EmbeddedFibre(Mixed):
     bar (:class:`turgor.fem.term.Term`): the length constraint of a fibre that is a million times stiffer than the
     body is then linear to the iteration, which converges in long steps.
 
+    Of a bar in a plane of symmetry, which cuts it lengthwise, only a part of E A belongs to the body. Axial forces are
+    always those of the whole section.
+
     Parameters
     ----------
     mesh
@@ -85,7 +89,13 @@ class EmbeddedFibre(Mixed):
     Raises
     ------
     InputError
-        If the mesh is plane or has no such curve, the curve leaves the body, or a property is not positive.
+        If the mesh is plane or has no such curve, the curve leaves the body, a property is not positive, or the curve
+        runs in a plane of symmetry through which the body reaches.
+
+    Attributes
+    ----------
+    part
+        What part of each bar's section belongs to the body, ``(n_bars,)``: one but in planes of symmetry.
     """
 
     def __init__(self, mesh: Mesh, fibre: Fibre) -> None:
@@ -99,6 +109,7 @@ class EmbeddedFibre(Mixed):
         self.nodes, (self._share,) = in_blocks(self.bars)
         self._span = self._difference(mesh.points)
         self.length = np.linalg.norm(self._span, axis=1)
+        self.part = _parts_in_body(mesh, self.ends, f"fibres.{fibre.curve}")
 
     @property
     def resists_bending(self) -> bool:
@@ -117,23 +128,24 @@ class EmbeddedFibre(Mixed):
 
     def energy(self, state: State) -> float:
         """Return the strain energy, N mm."""
-        return 0.5 * float(np.sum(self.tension(state.u) ** 2 * self.length)) / self.fibre.axial_stiffness
+        square = float(np.sum(self.part * self.tension(state.u) ** 2 * self.length))
+        return 0.5 * square / self.fibre.axial_stiffness
 
     def merit(self, state: State, lagged: Floats) -> float:
         """Return the work of the lagged axial forces, N mm."""
         _, length = self._direction(state.u)
-        return float(np.vdot(lagged, length - self.length))
+        return float(np.vdot(self.part * lagged, length - self.length))
 
     def force_of(self, u: Floats, lagged: Floats, out: Floats) -> None:
         """Add the forces of bars with given axial forces, N."""
         direction, _ = self._direction(u)
-        pull = lagged[:, None] * direction
+        pull = (self.part * lagged)[:, None] * direction
         add_at_nodes(self.nodes, self._share[:, :, None] * pull[:, None, :], out)
 
     def stiffness(self, state: State, lagged: Floats, out: Floats) -> None:
         """Fill E A/L n ⊗ n of the taut bars and the geometric part of the lagged axial forces, N/mm."""
         direction, length = self._direction(state.u)
-        _fill_stiffness(self._share, direction, self._axial(state.u), lagged / length, out)
+        _fill_stiffness(self._share, direction, self.part * self._axial(state.u), self.part * lagged / length, out)
 
     def lagged_at(self, state: State) -> Floats:
         """Return the axial forces of a state, ``(n_bars,)``, N."""
@@ -185,6 +197,23 @@ def _bar_ends(mesh: Mesh, fibre: Fibre) -> Floats:
         stations.append(np.linspace(at[first], at[last], count + 1)[1:])
     wanted = np.concatenate(stations)
     return np.column_stack([np.interp(wanted, at, curve[:, i]) for i in range(3)])
+
+
+def _parts_in_body(mesh: Mesh, ends: Floats, key: str) -> Floats:
+    """Return what part of the round section of each bar lies on the body's side of all planes of symmetry."""
+    bars = np.stack([ends[:-1], ends[1:]], axis=1)
+    angle = np.full(len(bars), 2.0 * np.pi)
+    met: list[tuple[Floats, NDArray[np.bool_]]] = []
+    for plane in planes_of_symmetry(mesh):
+        inside = plane.holds(bars)
+        if inside.any():
+            plane.check_behind(mesh, "it does not halve a fibre", key)
+        angle[inside] = np.minimum(angle[inside], np.pi)
+        for normal, others in met:  # along the edge of two cuts lies what is between these
+            between = np.pi - np.arccos(np.clip(normal @ plane.normal, -1.0, 1.0))
+            angle[inside & others] = np.minimum(angle[inside & others], between)
+        met.append((plane.normal, inside))
+    return angle / (2.0 * np.pi)
 
 
 def _mean_edge(mesh: Mesh, curve: Floats, name: str) -> float:

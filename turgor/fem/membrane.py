@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.common.rows import row_numbers
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes, pack_symmetric
 from turgor.mesh.cells import Cell, body_cell
 from turgor.mesh.faces import all_faces, shared_faces
 from turgor.mesh.mesh import Mesh
+from turgor.mesh.symmetry import planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -52,6 +54,7 @@ class BondedMembrane(Mixed):
     hardly stretches needs no other law at large rotations). The stress resultants S are what lags
     (:class:`turgor.fem.term.Term`). The quadrature has the fewest points that leave a flat face no motion without
     strain but the rigid ones: more would ask a stiff sheet to be free of strain at more points than it can.
+    Of a sheet in a plane of symmetry, which cuts it lengthwise, only half of the thickness belongs to the body.
 
     Parameters
     ----------
@@ -63,7 +66,8 @@ class BondedMembrane(Mixed):
     Raises
     ------
     InputError
-        If there is no such surface, the two regions do not touch, or a property is out of bounds.
+        If there is no such surface, the two regions do not touch, a property is out of bounds, or the sheet lies in a
+        plane of symmetry through which the body reaches.
     """
 
     def __init__(self, mesh: Mesh, membrane: Membrane) -> None:
@@ -71,6 +75,7 @@ class BondedMembrane(Mixed):
         self.nodes = np.ascontiguousarray(_faces(mesh, membrane), dtype=np.int32)
         self._positions = mesh.points[self.nodes]
         self._gradient, self.dA = _reference(self._positions, body_cell(self.nodes))
+        self.dA[_in_planes_of_symmetry(mesh, self.nodes, f"membranes.{membrane.name}")] *= 0.5
         self._law = _plane_stress(membrane)
         # Strain is measured against the metric that rounding leaves at rest, so that rest is free of stress.
         self._metric = _metric(self._tangents(np.zeros_like(mesh.points)))
@@ -180,3 +185,15 @@ def _faces(mesh: Mesh, membrane: Membrane) -> Ints:
     if len(shared) == 0:
         raise InputError("the two regions have no face in common", key="membranes.surface", value=membrane.name)
     return np.asarray(all_faces(first)[shared])
+
+
+def _in_planes_of_symmetry(mesh: Mesh, faces: Ints, key: str) -> NDArray[np.bool_]:
+    """Return which of the faces ``(k, n)`` lie in the cut of a plane of symmetry, ``(k,)``."""
+    found = np.zeros(len(faces), bool)
+    for plane in planes_of_symmetry(mesh):
+        numbers = row_numbers(np.sort(np.vstack([faces, plane.faces]), axis=1))
+        inside = np.isin(numbers[: len(faces)], numbers[len(faces) :])
+        if inside.any():
+            plane.check_behind(mesh, "it does not halve a sheet", key)
+        found |= inside
+    return found

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from turgor.common.errors import InputError
 from turgor.mesh.cells import face_fluxes
 from turgor.mesh.mesh import Mesh
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 
-_PARALLEL = float(np.cos(np.radians(1.0)))
-"""Cosine of the angle by which faces of one plane of symmetry may look aside."""
+_PARALLEL, _ASIDE = float(np.cos(np.radians(1.0))), float(np.sin(np.radians(1.0)))
+"""Cosine and sine of the angle by which faces, and lines, of one plane of symmetry may look aside."""
 
 _OFF = 1e-3
 """Part of the mesh's extent by which they may lie off it."""
@@ -45,6 +46,24 @@ class SymmetryPlane:
     def height(self, places: FloatArray) -> FloatArray:
         """Return how far `places` ``(..., d)`` are in front of the plane, on the body's side, mm."""
         return np.asarray((self.point - places) @ self.normal)
+
+    def holds(self, lines: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which of some straight `lines` ``(n, 2, d)``, given by their ends, lie in the plane."""
+        near = (np.abs(self.height(lines)) <= self.off).all(axis=1)
+        # One that is shorter than what the plane may be off could also cross it.
+        span = lines[:, 1] - lines[:, 0]
+        return np.asarray(near & (np.abs(span @ self.normal) <= _ASIDE * np.linalg.norm(span, axis=1)))
+
+    def check_behind(self, mesh: Mesh, consequence: str, key: str) -> None:
+        """Raise InputError if the body reaches behind the plane, where its mirror image should be."""
+        height = self.height(mesh.points)
+        if height.min() < -self.off:
+            raise InputError(
+                f"the body reaches through its plane of symmetry, so that {consequence}",
+                key=key,
+                value=f"{-height.min():.4g} mm behind it at {mesh.points[height.argmin()].round(3).tolist()} mm",
+                expected="a body on one side of each surface 'symmetry…', or another name of the surface",
+            )
 
 
 def planes_of_symmetry(mesh: Mesh) -> Iterator[SymmetryPlane]:

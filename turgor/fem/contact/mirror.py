@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from turgor.common.errors import InputError
 from turgor.fem.contact.friction import WIDTH
 from turgor.fem.contact.skin import STIFFNESS, Skin
 from turgor.fem.contact.term import GROWTH_OF_OVERLAP, Contact, Touch
@@ -134,14 +133,8 @@ def mirrors(mesh: Mesh, contact: Contact) -> list[Mirror]:
     """
     found = []
     for k, plane in enumerate(planes_of_symmetry(mesh), 1):
+        plane.check_behind(mesh, "it cannot meet its mirror image", "contact")
         height = plane.height(mesh.points)
-        if height.min() < -plane.off:
-            raise InputError(
-                "the body reaches through its plane of symmetry, so that it cannot meet its mirror image",
-                key="contact",
-                value=f"{-height.min():.4g} mm behind it at {mesh.points[height.argmin()].round(3).tolist()} mm",
-                expected="a body on one side of each surface 'symmetry…', or another name of the surface",
-            )
         front = np.flatnonzero((height[contact.skin.faces] > plane.off).any(axis=1)).astype(np.int32)
         found.append(Mirror(contact.skin, front, plane, f"{contact.name}:mirror" + (f"-{k}" if k > 1 else "")))
     return found
