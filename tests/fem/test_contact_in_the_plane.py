@@ -91,6 +91,53 @@ def test_refusals(body, motion, problem):
         )
 
 
+def turned(body):
+    support, contact = [Clamped("y1")], [RigidContact(body, label="jaw")]
+    return System(
+        rectangle((1.0, 1.0), (1, 1)), {"body": neo_hookean()}, support, section=Axisymmetric(), contact=contact
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        (
+            Cylinder((0.0, -3.0, -9.0), (0.0, -3.0, 9.0), 2.0),
+            r"^contact\.jaw\.end: a bar across .*expected a bar in the plane",
+        ),
+        (Cylinder((5.0, 0.0, -9.0), (5.0, 0.0, 9.0), 2.0), r"^contact\.jaw\.end: a bar across the plane"),
+        (
+            Box((3.0, -1.0, -1.0), (5.0, 1.0, 1.0)),
+            r"^contact\.jaw\.lower: a box beside the y axis .*or a cylinder along y",
+        ),
+    ],
+)
+def test_what_is_no_body_of_revolution_is_refused(body, problem):
+    with pytest.raises(InputError, match=problem):
+        turned(body)
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        (Plane((0.0, -1.0, 0.0), (0.0, 1.0, 0.0)), ""),
+        (Sphere((0.0, -3.0, 0.0), 2.0), ""),
+        (Cylinder((0.0, -3.0, 0.0), (0.0, -1.0, 0.0), 2.0), ""),
+        (Sphere((5.0, -3.0), 2.0), ""),  # a section anyway
+        (Plane((0.0, -1.0, 0.0), (0.1, 1.0, 0.0)), "plane stands for a cone"),
+        (Sphere((5.0, 0.0, 0.0), 2.0), "sphere stands for a ring"),
+        (Cylinder((5.0, 0.0, 0.0), (5.0, 1.0, 0.0), 2.0), "cylinder stands for a ring"),
+        (Box((-9.0, -2.0, -9.0), (9.0, -1.0, 9.0)), "box stands for a disc"),
+    ],
+)
+def test_what_is_another_body_when_it_is_turned_is_told(body, told, caplog):
+    with caplog.at_level("WARNING", "turgor.fem"):
+        turned(body)
+    assert [record.getMessage() for record in caplog.records] == (
+        [f"contact.jaw: this {told} about the axis of the model"] if told else []
+    )
+
+
 def test_a_body_of_the_plane_has_no_place_in_space():
     with pytest.raises(InputError, match="2 coordinates"):
         System(

@@ -78,6 +78,10 @@ class Plane:
         _check_plane(self.normal, "normal")
         return replace(self, point=self.point[:2], normal=self.normal[:2])
 
+    def turned(self) -> str:
+        """Return "cone" if it leans; see :data:`Sectioned`."""
+        return "cone" if self.normal[0] != 0.0 else ""
+
 
 @dataclass(frozen=True)
 class Sphere:
@@ -108,6 +112,10 @@ class Sphere:
         """Return the circle; see :data:`Sectioned`."""
         _check_plane(self.centre, "centre")
         return replace(self, centre=self.centre[:2])
+
+    def turned(self) -> str:
+        """Return "ring" if it is beside the axis; see :data:`Sectioned`."""
+        return "ring" if self.centre[0] != 0.0 else ""
 
 
 @dataclass(frozen=True)
@@ -156,6 +164,17 @@ class Cylinder:
         _check_plane(self.end, "end")
         return replace(self, start=self.start[:2], end=self.end[:2])
 
+    def turned(self) -> str:
+        """Return "ring" if it is not on the axis; see :data:`Sectioned`."""
+        if self.start[2] or self.end[2]:
+            raise InputError(
+                "a bar across the plane of the model is no body of revolution about the y axis",
+                key="end",
+                value=self.end,
+                expected="a bar in the plane z = 0, or a sphere, which beside the axis stands for a ring",
+            )
+        return "ring" if self.start[0] or self.end[0] else ""
+
 
 @dataclass(frozen=True)
 class Box:
@@ -194,12 +213,26 @@ class Box:
             raise InputError("the box does not reach across the plane z = 0", key="lower", value=self.lower)
         return replace(self, lower=self.lower[:2], upper=self.upper[:2])
 
+    def turned(self) -> str:
+        """Return "disc"; see :data:`Sectioned`."""
+        if any(self.lower[axis] != -self.upper[axis] for axis in (0, 2)):
+            raise InputError(
+                "a box beside the y axis is no body of revolution about it",
+                key="lower",
+                value=self.lower,
+                expected="a box with the axis in its middle, which stands for a disc, or a cylinder along y in the "
+                "plane z = 0, which beside the axis stands for a ring",
+            )
+        return "disc"
+
 
 Sectioned = Plane | Sphere | Cylinder | Box
 """Bodies that a plane model may meet too.
 
 Their method ``section`` returns what the plane z = 0 cuts out of them, in two coordinates (themselves if they have only
-two), and raises InputError if they do not look the same in front of and behind that plane.
+two), and raises InputError if they do not look the same in front of and behind that plane. Given in space, their method
+``turned`` returns what that section becomes when a body of revolution turns it about y, if that is another body than
+they are, else nothing; it raises InputError if they reach out of the plane where nothing that is turned does.
 """
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
+from turgor.common.log import logger
 from turgor.common.rows import row_numbers
 from turgor.fem.contact.barrier import REACH, Barrier
 from turgor.fem.contact.hull import hull
@@ -23,6 +24,8 @@ from turgor.fem.section import Axisymmetric, Section, in_section, on_axis
 from turgor.materials.hyperelastic import Hyperelastic
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
+
+log = logger("fem")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -269,7 +272,7 @@ def _fitting(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[R
     if section is not None:
         if not isinstance(body, Sectioned):
             raise InputError("this body has no place in a plane model", key=key, value=type(body).__name__)
-        body = body.section()
+        body = _section(body, section, key)
     if len(body.reference_point) != mesh.dimension:
         raise InputError(
             "the body does not fit the model",
@@ -278,3 +281,18 @@ def _fitting(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[R
             expected=f"{mesh.dimension} coordinates",
         )
     return body, motion
+
+
+def _section(body: Sectioned, section: Section, key: str) -> Sectioned:
+    """Return what a plane model meets of a body; tell of one in space that is another one when it is turned."""
+    try:
+        cut = body.section()
+        in_space = len(body.reference_point) > cut.reference_point.size
+        stands_for = body.turned() if in_space and isinstance(section, Axisymmetric) else ""
+    except InputError as error:
+        raise InputError(error.problem, key=f"{key}.{error.key}", value=error.value, expected=error.expected) from None
+    if stands_for:
+        log.warning(
+            "%s: this %s stands for a %s about the axis of the model", key, type(body).__name__.lower(), stands_for
+        )
+    return cut
