@@ -241,6 +241,48 @@ def test_a_surface_may_meet_itself(kind):
     assert found[0] == found[1] > 0.0
 
 
+LOW_HIGH = PairContact("low-z1", "high-z0")
+
+
+@pytest.mark.parametrize(
+    ("contact", "counts"),
+    [
+        ([LOW_HIGH, SelfContact()], "self"),
+        ([SelfContact(), LOW_HIGH], "self"),
+        ([LOW_HIGH, PairContact("high-z0", "low-z1")], "low-z1:high-z0"),
+        ([PairContact("high", "low-z1"), LOW_HIGH], "high:low-z1"),
+    ],
+)
+def test_faces_that_meet_by_two_contacts_press_once(contact, counts, caplog):
+    mesh = stacked(0.3, "tet10").mesh
+    high = boundary_faces(mesh.cells[mesh.points[mesh.cells][:, :, 2].min(axis=1) > 1.2])
+    mesh = Mesh(mesh.points, mesh.cells, surfaces={**mesh.surfaces, "high": high})
+    down = np.where(mesh.points[:, 2:] > 1.2, -0.32, 0.0) * [0.0, 0.0, 1.0]
+
+    def pressed(cases):
+        system = System(mesh, {"body": neo_hookean(ratio=20)}, [Clamped("low-z0"), Clamped("high-z1")], contact=cases)
+        return system, system.contact_force(system.consistent(down, system.reference_state().loads))
+
+    once = pressed([LOW_HIGH])[1]
+    assert not caplog.records
+    system, twice = pressed(contact)
+    assert [term.name for term in system.contacts] == [counts]
+    assert twice == pytest.approx(once) != 0.0
+    assert f"counts once, with '{counts}'" in caplog.text
+
+
+def test_contacts_that_contradict_each_other_are_refused():
+    mesh = stacked(0.3, "tet10").mesh
+    part = {"part": mesh.surfaces["high-z0"][1:]}
+    more = Mesh(mesh.points, mesh.cells, surfaces=mesh.surfaces | part)
+    for other, problem in (
+        (SelfContact(friction=0.1), r"^contact\.pairs: .*also 'self' says .*says otherwise \(found 'low-z1:high-z0'\)"),
+        (PairContact("part", "low-z1"), "some faces .* 'part:low-z1' already, others not"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            System(more, {"body": neo_hookean()}, [Clamped("low-z0"), Clamped("high-z1")], contact=[other, LOW_HIGH])
+
+
 def test_refusals():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
     with pytest.raises(InputError, match=r"share faces.*'x0:skin'"):

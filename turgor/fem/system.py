@@ -17,6 +17,7 @@ from turgor.fem.constraints import compile_constraints, with_bodies
 from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.mirror import mirrors
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
+from turgor.fem.contact.once import each_pair_once
 from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact, led, make_contact
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
@@ -61,13 +62,15 @@ class System:
     section
         What a plane mesh stands for; forces, energies and volumes are those of the slice or the full turn.
     contact
-        What may touch what. A rigid body that moves is a load too: its factor is in ``State.loads``.
+        What may touch what; faces that may meet by two of these press on each other once. A rigid body that moves is a
+        load too: its factor is in ``State.loads``.
 
     Raises
     ------
     InputError
         If a region has no material or a material no region, a name is unknown, a cavity is open, gravity acts on a
-        region without density, the section does not fit the mesh, or the body is free to move as a whole.
+        region without density, the section does not fit the mesh, contacts contradict each other, or the body is free
+        to move as a whole.
     """
 
     @dense_products_on_one_thread()
@@ -83,6 +86,7 @@ class System:
     ) -> None:
         choose_threads()
         check_section(mesh, section)
+        contact = each_pair_once(mesh, contact)
         self.mesh = mesh
         self.section = section
         self.solids = solids_of(mesh, materials, section)
