@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from samples import neo_hookean, random_state, shifted
+from scipy.optimize import minimize_scalar
 
 from turgor.common.errors import InputError
 from turgor.fem.elements import pressure_modes
@@ -16,8 +17,13 @@ from turgor.fem.section import Axisymmetric, PlaneStrain, PlaneStress
 from turgor.fem.sheet import Sheet
 from turgor.fem.supports import Clamped, ElasticSupport, Prescribed, Sliding
 from turgor.fem.system import System
+from turgor.materials.expression import define_model
+from turgor.materials.models.arruda_boyce import ArrudaBoyce
+from turgor.materials.models.extended_tube import ExtendedTube
+from turgor.materials.models.gent import Gent
 from turgor.materials.models.mooney_rivlin import MooneyRivlin2
 from turgor.materials.models.ogden import Ogden2
+from turgor.materials.models.van_der_waals import VanDerWaals
 from turgor.materials.volumetric import Logarithmic, Quadratic
 from turgor.mesh.cells import CELLS
 from turgor.mesh.mesh import Mesh
@@ -240,6 +246,41 @@ def test_a_compressible_sheet_thins_by_poissons_ratio():
     nu = material.poisson_ratio
     assert found.state.u[mesh.surface_nodes("y1"), 1].mean() == pytest.approx(-nu * 1e-5, rel=1e-4)
     assert system.dilatation(found.state)[0] - 1.0 == pytest.approx((1 - 2 * nu) * 1e-5, rel=1e-4)
+
+
+FUNG = define_model({"name": "fung", "energy": "mu*(exp(20*(I1 - 3)) - 1)", "constants": {"mu": {"unit": "MPa"}}})
+LOCKING = {
+    "Gent": Gent(mu=1.0, Jm=3.0, volumetric=Quadratic(5.0)),
+    "Gent, nearly incompressible": Gent(mu=1.0, Jm=3.0, volumetric=Quadratic(1e4)),
+    "van der Waals": VanDerWaals(mu=1.0, lambda_m=2.2, a=0.1, beta=0.5, volumetric=Logarithmic(5.0)),
+    "extended tube": ExtendedTube(Gc=1.0, delta=0.5, Ge=0.2, beta=0.4, volumetric=Quadratic(5.0)),
+    "Arruda and Boyce": ArrudaBoyce(mu=1.0, lambda_m=0.6, volumetric=Quadratic(5.0)),
+    "Fung": FUNG(mu=0.1, volumetric=Quadratic(100.0)),
+}
+
+
+@pytest.mark.parametrize("name", LOCKING)
+@pytest.mark.parametrize("stretches", [(1.9, 1.9), (2.3, 1.1), (2.1, 0.7)])
+def test_a_sheet_that_locks_at_its_volume_at_rest_grows_instead(name, stretches):
+    material = LOCKING[name]
+    mesh = rectangle((1.0, 1.0), (1, 1))
+    system = System(mesh, {"body": material}, [Clamped("x0")], section=PlaneStress())
+    F = np.diag(stretches)
+
+    def energy(log_thickness):
+        with np.errstate(over="ignore"):
+            return float(material.energy(np.diag([*stretches, np.exp(log_thickness)])))
+
+    grid = np.linspace(-3.0, 1.0, 4001)
+    values = [energy(place) for place in grid]
+    best = int(np.argmin(values))
+    least = minimize_scalar(energy, bounds=grid[[best - 1, best + 1]], method="bounded", options={"xatol": 1e-12})
+    state = system.consistent(mesh.points @ (F - np.eye(2)), np.zeros(0))
+    assert system.energy(state) == pytest.approx(least.fun, rel=1e-8)
+    J = np.prod(stretches) * np.exp(least.x)
+    np.testing.assert_allclose(system.dilatation(state), J, rtol=1e-5)
+    stress = system.solids[0].cauchy_stress(state)
+    assert np.abs(stress[..., [2, 4, 5]]).max() < 1e-9 * np.abs(stress).max()
 
 
 def test_nodes_on_the_axis_stay_there_by_themselves():

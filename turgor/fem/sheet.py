@@ -25,13 +25,17 @@ LARGEST_STEP = 0.5
 MOST_STEPS = 50
 CONVERGED = 1e-12
 
+STARTS = 17
+"""Thicknesses of which the one of least energy is where the search begins if it fails from the volume at rest."""
+
 
 class Sheet(Solid):
     """∫ min over λ₃ of [W(F̄) + U(J)] dV: the stretch λ₃ across the sheet leaves its faces without stress.
 
     The minimum is found at each quadrature point by Newton's method on ln λ₃, to rounding, so that force and stiffness
-    are exact derivatives of the energy. The volume constraint is met by the thickness and puts none on the displacement
-    in the plane: there is nothing to lock, and no pressure to project.
+    are exact derivatives of the energy. It begins at the volume at rest; where a material that locks does not go there,
+    or stiffens so much that nothing is found from there, at the best of some volumes. The volume constraint is met by
+    the thickness and puts none on the displacement in the plane: there is nothing to lock, and no pressure to project.
     """
 
     def worst_jacobian(self, u: Floats) -> tuple[float, int]:
@@ -73,16 +77,44 @@ class Sheet(Solid):
         super()._find_deformation(u)
         area_ratio = self._now.J.copy()
         self._now.J[:] = 1.0
+        failed = self._settle(area_ratio)
+        if failed.any():
+            self._now.J[failed] = self._best_start(area_ratio)[failed]
+            failed = self._settle(area_ratio)
+        self._now.J[failed] = np.nan
+        self._now.F[:, :, 2, 2] = self._now.J / area_ratio
+
+    def _settle(self, area_ratio: Floats) -> NDArray[np.bool_]:
+        """Bring J to the minimum near it; return where that is not found, ``(m, q)``."""
+        way = np.zeros_like(area_ratio)
         for _ in range(MOST_STEPS):
             self._now.F[:, :, 2, 2] = self._now.J / area_ratio
             stress, stiffness = self._across()
-            change = np.clip(-stress / stiffness, -LARGEST_STEP, LARGEST_STEP)
-            self._now.J *= np.exp(change)
-            if np.abs(change).max() <= CONVERGED:
+            locked = ~(np.isfinite(stress) & np.isfinite(stiffness))
+            newton = np.clip(-stress / stiffness, -LARGEST_STEP, LARGEST_STEP)
+            # From where the material does not go, back half the way.
+            way = np.where(locked, 0.5 * way, newton)
+            self._now.J *= np.exp(np.where(locked, -way, way))
+            moving = np.abs(way) > CONVERGED
+            if not moving.any():
                 break
-        else:
-            self._now.J[:] = np.nan
-        self._now.F[:, :, 2, 2] = self._now.J / area_ratio
+        return np.asarray(moving | locked)
+
+    def _best_start(self, area_ratio: Floats) -> Floats:
+        """Return the J of least energy, between those that make the first and the second isochoric invariant least.
+
+        By λ₃ these are least at λ₃² = I/2 and 2 A²/I, I the sum of the squared stretches in the plane, A their product.
+        """
+        half = 0.5 * np.sum(self._now.F[:, :, :2, :2] ** 2, axis=(2, 3))
+        first, second = 0.5 * np.log(half), np.log(np.abs(area_ratio)) - 0.5 * np.log(half)
+        best, least = np.ones_like(area_ratio), np.full_like(area_ratio, np.inf)
+        for part in np.linspace(0.0, 1.0, STARTS):
+            self._now.F[:, :, 2, 2] = np.exp(first + part * (second - first))
+            self._now.J[:] = area_ratio * self._now.F[:, :, 2, 2]
+            energy = self._law()[0].reshape(area_ratio.shape) + self.material.volumetric.energy(self._now.J)
+            better = energy < least
+            best[better], least[better] = self._now.J[better], energy[better]
+        return best
 
     def _across(self) -> tuple[Floats, Floats]:
         """Return the first and second derivative of the energy by ln λ₃, each ``(m, q)``, MPa."""
