@@ -9,7 +9,7 @@ from samples import neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.mirror import Mirror
-from turgor.fem.contact.spec import Method, RigidContact, SelfContact
+from turgor.fem.contact.spec import Method, RigidContact, SelfContact, Spring
 from turgor.fem.loads import Pressure
 from turgor.fem.rigid import Sphere
 from turgor.fem.section import PlaneStrain
@@ -107,8 +107,10 @@ def test_a_body_on_both_sides_of_its_plane_of_symmetry_is_refused():
         System(mesh, {"body": neo_hookean()}, supports, contact=[SelfContact()])
 
 
-def force_on_a_ball(width: float, at: float, method: Method = "penalty") -> np.ndarray:
-    """The force, N, on a ball at x = `at` that a block 4 mm wide, or its half x ≥ 0, is pressed on by 1 mm."""
+def ball_under_a_block(
+    width: float, at: float, method: Method = "penalty", spring: Spring | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force, N, and displacement, mm, of a ball at x = `at` that a block, or its half, is pressed on by 1 mm."""
     block = box((width, 4.0, 2.0), (round(width), 4, 2), "hex27")
     points = block.points - [width - 2.0, 2.0, 0.0]
     surfaces = {"down": block.surfaces["z1"], "low": block.surfaces["z0"]}
@@ -117,10 +119,14 @@ def force_on_a_ball(width: float, at: float, method: Method = "penalty") -> np.n
         surfaces["symmetry"] = block.surfaces["x0"]
         held.append(Sliding("symmetry"))
     mesh = Mesh(points, block.cells, surfaces=surfaces)
-    ball = RigidContact(Sphere((at, 0.0, -2.01), 2.0), "low", method=method)
+    ball = RigidContact(Sphere((at, 0.0, -2.01), 2.0), "low", method=method, spring=spring)
     system = System(mesh, {"body": neo_hookean(0.1, 100.0)}, held, contact=[ball])
     (touch,) = system.touches(solve_path(system, output_fractions(4))[-1].state)
-    return np.array(touch.force)
+    return np.array(touch.force), np.array(touch.displacement)
+
+
+def force_on_a_ball(width: float, at: float, method: Method = "penalty") -> np.ndarray:
+    return ball_under_a_block(width, at, method)[0]
 
 
 def test_half_a_ball_feels_half_of_the_force():
@@ -129,3 +135,14 @@ def test_half_a_ball_feels_half_of_the_force():
     assert 2.0 * np.linalg.norm(half) == pytest.approx(np.linalg.norm(force_on_a_ball(4.0, 0.0)), rel=0.02)
     # A ball beside the plane has another one behind it, which feels its own force.
     assert abs(force_on_a_ball(2.0, 0.5)[0]) > 0.01
+
+
+def test_half_a_ball_is_on_half_of_its_spring():
+    along = Spring(0.2, (0.0, 0.0, 1.0))
+    whole, half = (ball_under_a_block(width, 0.0, spring=along) for width in (4.0, 2.0))
+    np.testing.assert_allclose(half[1], whole[1], rtol=1e-6)
+    assert 2.0 * half[0][2] == pytest.approx(whole[0][2], rel=1e-6)
+    # One that may move out of the plane, or stands beside it, has another one behind it.
+    for at, direction in ((0.0, (0.1, 0.0, 1.0)), (0.5, (0.0, 0.0, 1.0))):
+        force, moved = ball_under_a_block(2.0, at, spring=Spring(0.2, direction))
+        assert force @ direction / np.linalg.norm(direction) == pytest.approx(-0.2 * np.linalg.norm(moved), rel=1e-6)

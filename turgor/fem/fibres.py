@@ -16,7 +16,7 @@ from turgor.fem.locate import locate
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.symmetry import planes_of_symmetry
+from turgor.mesh.symmetry import part_in_front, planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -201,19 +201,16 @@ def _bar_ends(mesh: Mesh, fibre: Fibre) -> Floats:
 
 def _parts_in_body(mesh: Mesh, ends: Floats, key: str) -> Floats:
     """Return what part of the round section of each bar lies on the body's side of all planes of symmetry."""
-    bars = np.stack([ends[:-1], ends[1:]], axis=1)
-    angle = np.full(len(bars), 2.0 * np.pi)
-    met: list[tuple[Floats, NDArray[np.bool_]]] = []
-    for plane in planes_of_symmetry(mesh):
-        inside = plane.holds(bars)
-        if inside.any():
+    bars, part = np.stack([ends[:-1], ends[1:]], axis=1), np.ones(len(ends) - 1)
+    planes = list(planes_of_symmetry(mesh))
+    inside = np.array([plane.holds(bars) for plane in planes], bool).reshape(len(planes), len(bars))
+    for plane, holds in zip(planes, inside, strict=True):
+        if holds.any():
             plane.check_behind(mesh, "it does not halve a fibre", key)
-        angle[inside] = np.minimum(angle[inside], np.pi)
-        for normal, others in met:  # along the edge of two cuts lies what is between these
-            between = np.pi - np.arccos(np.clip(normal @ plane.normal, -1.0, 1.0))
-            angle[inside & others] = np.minimum(angle[inside & others], between)
-        met.append((plane.normal, inside))
-    return angle / (2.0 * np.pi)
+    normals = np.array([plane.normal for plane in planes]).reshape(len(planes), 3)
+    for cut in np.unique(inside, axis=1).T:
+        part[(cut == inside.T).all(axis=1)] = part_in_front(normals[cut])
+    return part
 
 
 def _mean_edge(mesh: Mesh, curve: Floats, name: str) -> float:

@@ -18,7 +18,7 @@ from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.mirror import mirrors
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
 from turgor.fem.contact.once import each_pair_once
-from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact, led, make_contact
+from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact, led, make_contact, spring_stiffness
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -436,8 +436,9 @@ class System:
         return np.zeros_like(self.constraints.value)
 
     def _springs(self) -> list[BodySpring]:
-        rows = enumerate(self._unknown_bodies, self.mesh.n_points)
-        return [BodySpring(row, c.spring.stiffness, self.mesh.dimension) for row, c in rows if c.spring is not None]
+        mesh, section = self.mesh, self.section
+        sprung = [(row, c) for row, c in enumerate(self._unknown_bodies, mesh.n_points) if c.spring is not None]
+        return [BodySpring(row, spring_stiffness(c, mesh, section), mesh.dimension) for row, c in sprung]
 
     def _cavity(self, load: Pressure, channel: int) -> Cavity:
         mesh = self.mesh

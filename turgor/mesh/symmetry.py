@@ -81,3 +81,24 @@ def planes_of_symmetry(mesh: Mesh) -> Iterator[SymmetryPlane]:
         normal = normals[here].sum(axis=0)
         yield SymmetryPlane(middles[largest], normal / np.linalg.norm(normal), faces[here], off)
         faces = faces[~here]
+
+
+def part_in_front(normals: FloatArray) -> float:
+    """Return what part of a ball around a point of some planes is in front of all of them.
+
+    Parameters
+    ----------
+    normals
+        Their unit normals out of the body, ``(k, d)``, at most three: a cut, an edge or a corner.
+
+    Returns
+    -------
+    float
+        One without a plane, a half of one, a quarter of two square to each other.
+    """
+    first, second = np.triu_indices(len(normals), 1)
+    between = np.pi - np.arccos(np.clip(np.sum(normals[first] * normals[second], axis=1), -1.0, 1.0))
+    if len(normals) < 2:
+        return 0.5 ** len(normals)
+    # Of three, the excess of the spherical triangle over π is its solid angle.
+    return float(between[0] / (2.0 * np.pi) if len(normals) == 2 else (between.sum() - np.pi) / (4.0 * np.pi))

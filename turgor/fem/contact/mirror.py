@@ -13,7 +13,7 @@ from turgor.fem.rigid import RigidBody
 from turgor.fem.state import State
 from turgor.fem.term import NO_NODES, Unlagged, add_at_nodes, pack_symmetric
 from turgor.mesh.mesh import Mesh, in_space
-from turgor.mesh.symmetry import SymmetryPlane, planes_of_symmetry
+from turgor.mesh.symmetry import SymmetryPlane, part_in_front, planes_of_symmetry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -140,11 +140,25 @@ def mirrors(mesh: Mesh, contact: Contact) -> list[Mirror]:
     return found
 
 
-def cut_across(body: RigidBody, motion: Floats, mesh: Mesh) -> Floats:
-    """Return the normals ``(k, 3)`` of the planes of symmetry that halve a rigid body, orthonormal.
+def cut_across(body: RigidBody, ways: Floats, mesh: Mesh) -> tuple[Floats, float]:
+    """Return what the planes of symmetry do to a rigid body that halve it.
 
     Its other halves feel the forces that the mirror images of the actuator exert. A body beside a plane has a whole
     image of its own behind it.
+
+    Parameters
+    ----------
+    body
+        The body.
+    ways
+        Along which it may move, ``(n, d)``; one that leads out of a plane has its image move the other way.
+    mesh
+        The actuator.
+
+    Returns
+    -------
+    across, part
+        The normals of these planes, orthonormal ``(k, 3)``, and what part of the body is in front of all of them.
     """
     places = mesh.points[:: 1 + len(mesh.points) // SAMPLES]
     distance = body.distance(places)[0]
@@ -152,7 +166,7 @@ def cut_across(body: RigidBody, motion: Floats, mesh: Mesh) -> Floats:
     for plane in planes_of_symmetry(mesh):
         mirrored = places + 2.0 * plane.height(places)[:, None] * plane.normal
         alike = np.allclose(body.distance(mirrored)[0], distance, rtol=0.0, atol=ALIKE * float(np.ptp(places)))
-        if alike and abs(float(motion @ plane.normal)) <= ALIKE * float(np.linalg.norm(motion)):
+        if alike and (np.abs(ways @ plane.normal) <= ALIKE * np.linalg.norm(ways, axis=1)).all():
             normals.append(plane.normal)
     spanned = np.linalg.qr(np.array(normals).T)[0].T if normals else np.empty((0, mesh.dimension))
-    return in_space(spanned)
+    return in_space(spanned), part_in_front(np.array(normals).reshape(-1, mesh.dimension))

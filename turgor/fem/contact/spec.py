@@ -186,7 +186,8 @@ def make_contact(
     if isinstance(case, RigidContact):
         faces = _whole(mesh, section) if case.surface is None else mesh.surface(case.surface)
         body, motion = _fitting(case, mesh, section)
-        turned, across = isinstance(section, Axisymmetric), cut_across(body, motion, mesh)
+        _tell_what_it_stands_for(case, section)
+        turned, (across, _) = isinstance(section, Axisymmetric), cut_across(body, _ways(case, motion), mesh)
         skin = Skin(mesh, faces, materials, pressure, section)
         if barrier:
             error = PARTS_OF_REACH * REACH * float(skin.wall.min())
@@ -209,6 +210,21 @@ def led(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[Floats
         return in_section(case.spring.direction, mesh, section, f"contact.{case.name}.spring", total=True), True
     assert case.motion is not None
     return in_section(case.motion, mesh, section, f"contact.{case.name}.motion", total=True), False
+
+
+def spring_stiffness(case: RigidContact, mesh: Mesh, section: Section | None) -> float:
+    """Return the stiffness of the part of a body's spring that is in the model, N/mm.
+
+    A plane of symmetry that halves the body halves the spring as well: the other half is held by the other.
+    """
+    assert case.spring is not None
+    body, motion = _fitting(case, mesh, section)
+    return case.spring.stiffness * cut_across(body, _ways(case, motion), mesh)[1]
+
+
+def _ways(case: RigidContact, motion: Floats) -> Floats:
+    """Return along what a body may move, ``(n, d)``."""
+    return np.array([motion] if case.spring is None else [motion, case.spring.direction[: len(motion)]])
 
 
 def _check(case: ContactCase) -> None:
@@ -284,15 +300,22 @@ def _fitting(case: RigidContact, mesh: Mesh, section: Section | None) -> tuple[R
 
 
 def _section(body: Sectioned, section: Section, key: str) -> Sectioned:
-    """Return what a plane model meets of a body; tell of one in space that is another one when it is turned."""
+    """Return what a plane model meets of a body."""
     try:
-        cut = body.section()
-        in_space = len(body.reference_point) > cut.reference_point.size
-        stands_for = body.turned() if in_space and isinstance(section, Axisymmetric) else ""
+        _stands_for(body, section)
+        return body.section()
     except InputError as error:
         raise InputError(error.problem, key=f"{key}.{error.key}", value=error.value, expected=error.expected) from None
-    if stands_for:
-        log.warning(
-            "%s: this %s stands for a %s about the axis of the model", key, type(body).__name__.lower(), stands_for
-        )
-    return cut
+
+
+def _stands_for(body: Sectioned, section: Section) -> str:
+    """Return what another body one in space becomes in a body of revolution, else nothing."""
+    in_space = len(body.reference_point) > body.section().reference_point.size
+    return body.turned() if in_space and isinstance(section, Axisymmetric) else ""
+
+
+def _tell_what_it_stands_for(case: RigidContact, section: Section | None) -> None:
+    other = "" if section is None or not isinstance(case.body, Sectioned) else _stands_for(case.body, section)
+    if other:
+        what = type(case.body).__name__.lower()
+        log.warning("contact.%s: this %s stands for a %s about the axis of the model", case.name, what, other)
