@@ -9,7 +9,7 @@ from samples import neo_hookean, random_state
 
 from turgor.common.errors import InputError
 from turgor.fem.contact.mirror import Mirror
-from turgor.fem.contact.spec import Method, RigidContact, SelfContact, Spring
+from turgor.fem.contact.spec import ContactCase, Method, PairContact, RigidContact, SelfContact, Spring
 from turgor.fem.loads import Pressure
 from turgor.fem.rigid import Sphere
 from turgor.fem.section import PlaneStrain
@@ -50,7 +50,9 @@ def half() -> Mesh:
     )
 
 
-def inflated(mesh: Mesh, supports: list[Support], method: Method = "penalty") -> tuple[System, np.ndarray]:
+def inflated(
+    mesh: Mesh, supports: list[Support], method: Method = "penalty", contact: ContactCase | None = None
+) -> tuple[System, np.ndarray]:
     """The system, and the volume of its air at five pressures, mm³."""
     system = System(
         mesh,
@@ -58,7 +60,7 @@ def inflated(mesh: Mesh, supports: list[Support], method: Method = "penalty") ->
         supports,
         [Pressure("inner", SUCTION)],
         section=PlaneStrain(),
-        contact=[SelfContact(method=method)],
+        contact=[contact or SelfContact(method=method)],
     )
     found = solve_path(system, output_fractions(5))
     return system, np.array([system.cavities[0].volume(e.state.u) for e in found])
@@ -80,6 +82,12 @@ def test_so_it_does_where_a_barrier_keeps_the_rest_apart():
     _, volumes = inflated(quarter(), [Sliding("symmetry")], "barrier")
     _, by_penalty = inflated(quarter(), [Sliding("symmetry")])
     assert volumes == pytest.approx(by_penalty, rel=1e-3)
+
+
+def test_so_does_a_surface_that_may_meet_itself():
+    part, volumes = inflated(quarter(), [Sliding("symmetry")], contact=PairContact("inner", "inner"))
+    assert [c.name for c in part.contacts] == ["inner:inner", "inner:inner:mirror", "inner:inner:mirror-2"]
+    assert volumes == pytest.approx(inflated(quarter(), [Sliding("symmetry")])[1], rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["tet10", "hex27"])

@@ -18,7 +18,15 @@ from turgor.fem.contact.barrier import Barrier
 from turgor.fem.contact.mirror import mirrors
 from turgor.fem.contact.obstacle import BodySpring, Obstacle
 from turgor.fem.contact.once import each_pair_once
-from turgor.fem.contact.spec import ContactCase, RigidContact, SelfContact, led, make_contact, spring_stiffness
+from turgor.fem.contact.spec import (
+    ContactCase,
+    PairContact,
+    RigidContact,
+    SelfContact,
+    led,
+    make_contact,
+    spring_stiffness,
+)
 from turgor.fem.contact.term import Contact, Touch
 from turgor.fem.fibres import EmbeddedFibre, Fibre
 from turgor.fem.frames import BlockFrames, block_products
@@ -427,7 +435,8 @@ class System:
             channel = next(channels) if isinstance(case, RigidContact) and case.is_load else None
             row = next(rows) if isinstance(case, RigidContact) and case.is_unknown else None
             found.append(make_contact(self.mesh, materials, case, pressure, channel, self.section, number, row))
-        own = [contact for case, contact in zip(cases, found, strict=True) if isinstance(case, SelfContact)]
+        with_itself = [isinstance(c, SelfContact) or (isinstance(c, PairContact) and c.is_of_one) for c in cases]
+        own = itertools.compress(found, with_itself)
         return [*found, *(mirror for contact in own for mirror in mirrors(self.mesh, contact))]
 
     @property

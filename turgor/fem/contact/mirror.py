@@ -122,7 +122,7 @@ class Mirror(Unlagged):
 
 
 def mirrors(mesh: Mesh, contact: Contact) -> list[Mirror]:
-    """Return what a body that may meet itself does at its planes of symmetry, also by the barrier a penalty.
+    """Return what a body or surface that may meet itself does at the planes of symmetry, also by the barrier a penalty.
 
     Points in such a plane are at no distance from it, which a barrier cannot hold.
 

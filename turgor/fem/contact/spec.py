@@ -79,6 +79,11 @@ class PairContact:
         """What the contact is called in results."""
         return f"{self.first}:{self.second}"
 
+    @property
+    def is_of_one(self) -> bool:
+        """Whether a surface may meet itself."""
+        return self.first == self.second
+
 
 @dataclass(frozen=True)
 class Spring:
@@ -157,7 +162,7 @@ def make_contact(
     number: int = 0,
     node: int | None = None,
 ) -> Contact:
-    """Return the term of a contact; of one with itself without what it does at planes of symmetry
+    """Return the term of a contact; of a surface with itself without what it does at planes of symmetry
     (:func:`turgor.fem.contact.mirror.mirrors`).
 
     Parameters
@@ -258,7 +263,7 @@ def _meeting(mesh: Mesh, case: SelfContact | PairContact, section: Section | Non
     """Return the faces that may meet and the group of each; without groups any may meet any."""
     if isinstance(case, SelfContact):
         return _whole(mesh, section), None
-    if case.first == case.second:
+    if case.is_of_one:
         return mesh.surface(case.first), None
     both = [mesh.surface(name) for name in (case.first, case.second)]
     faces = np.vstack(both)
