@@ -48,7 +48,7 @@ def limit_of_air(walk: VolumeWalk, target: float) -> Equilibrium | None:
         return slope_of(air, system, state)
 
     try:
-        by_volume = VolumeWalk(system, walk.linear, walk.here, step, walk.options, Volume(air.weights))
+        by_volume = VolumeWalk(system, walk.linear, walk.here, step, walk.options, Volume(air.weights), watched=air)
         here = walk.here
         for found in itertools.islice(by_volume, STEPS):
             if slope(here) * slope(found) < 0.0:

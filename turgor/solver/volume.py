@@ -102,6 +102,8 @@ class VolumeWalk:
         Bound of a step's size.
     smallest_part
         Part of the first step below which none is cut.
+    watched
+        Another quantity of the same weights, of which no step is to hide limits.
 
     Attributes
     ----------
@@ -120,6 +122,7 @@ class VolumeWalk:
         *,
         longest: float = np.inf,
         smallest_part: float = SMALLEST_PART,
+        watched: Quantity | None = None,
     ) -> None:
         self.system = system
         self.linear = linear
@@ -127,6 +130,7 @@ class VolumeWalk:
         self.quantity = quantity or Volume()
         self.line = system.loading.line_at(start.fraction)
         self.longest, self.smallest_part = longest, smallest_part
+        self.watched = watched
         self.here = start if start.compliance is not None else self.with_compliance(start)
         self.before: Equilibrium | None = None
         self._earlier: Equilibrium | None = None
@@ -192,6 +196,9 @@ class VolumeWalk:
 
         `part` is its length over that of the first one.
         """
+        if self._may_have_snapped(found):
+            log.info("the step may have snapped")
+            return True
         if part > SHORT_ENOUGH and self._may_hide_limits(found):
             log.info("the step may hide limits")
             return True
@@ -345,14 +352,37 @@ class VolumeWalk:
         """Say whether a state is unstable while the quantity is held, and the one before it was not seen to be."""
         return self.is_stable(found) is False and self.is_stable(before) is not False
 
-    def _may_hide_limits(self, found: Equilibrium) -> bool:
-        """Whether the load may have a maximum and a minimum on the way to a state, both hidden."""
+    def _may_have_snapped(self, found: Equilibrium) -> bool:
+        """Whether what is held, an amount of air, may have a maximum and a minimum on the way to a state.
+
+        It grows with its conjugate where a state is stable while it is held: however short the step, where it does not
+        do so all the way the path has been left.
+        """
         ends = (self.here, found)
-        slopes = [1.0 / c for c in map(_compliance, ends) if c]
-        if len(slopes) < 2 or slopes[0] * slopes[1] < 0.0:
+        return all(self.is_stable(end) for end in ends) and self._may_turn(found, self.quantity)
+
+    def _may_hide_limits(self, found: Equilibrium) -> bool:
+        """Whether the load, or what is watched, may have a maximum and a minimum on the way to a state, both hidden."""
+        return self._may_turn(found) or (self.watched is not None and self._may_turn(found, self.watched))
+
+    def _may_turn(self, found: Equilibrium, quantity: Quantity | None = None) -> bool:
+        """Whether a quantity, or without one the load, may turn twice on the way to a state.
+
+        It is a smooth function of its conjugate, through limits of its own, too. One limit is told by its slopes.
+        """
+        ends = (self.here, found)
+        if not all(end.compliance for end in ends):
             return False
-        change = self._conjugate(found) - self._conjugate(self.here)
-        return change == 0.0 or not is_monotone((found.fraction - self.here.fraction) / change, *slopes)
+        conjugates = [self._conjugate(end) for end in ends]
+        if quantity is None:
+            values, slopes = [end.fraction for end in ends], [_slope_of_load(end) for end in ends]
+        else:
+            values = [quantity.value(q, end.fraction) for q, end in zip(conjugates, ends, strict=True)]
+            slopes = [slope_of(quantity, self.system, end) for end in ends]
+        if slopes[0] * slopes[1] < 0.0:
+            return False
+        change = conjugates[1] - conjugates[0]
+        return change == 0.0 or not is_monotone((values[1] - values[0]) / change, *slopes)
 
 
 def knows_volume(system: System, state: State) -> bool:
