@@ -122,11 +122,13 @@ def test_where_the_volume_turns_back_no_step_lands_on_another_branch_unnoticed(s
 
 
 def test_an_arc_that_leads_back_ends():
-    system = arch(4e-4, rise=1.5)
-    found: list[Equilibrium] = []
+    system = arch(2e-4)
     target = volumes(system, 20.0, 1)[-1]
+    *_, here, further = follow_arc(system, Volume(ONE), volumes(system, 4.0, 1)[-1], 0.1)
+    found: list[Equilibrium] = []
+    # Come from further on, it goes on back to rest and into suction.
     with pytest.raises(StoppedShortError, match="leads back past where it began") as stopped:
-        follow_arc(system, Volume(ONE), target, 0.2, on_equilibrium=found.append)
+        follow_arc(system, Volume(ONE), target, 0.2, start=here, before=further, on_equilibrium=found.append)
     assert stopped.value.outcome is Outcome.OUT_OF_REACH
     assert stopped.value.facts["part_of_the_way"] == pytest.approx(
         (system.conjugate(found[-1].state, ONE) - target) / 20.0 + 1.0

@@ -10,9 +10,12 @@ from turgor.solver.apart import kept_apart
 from turgor.solver.control import AlongTangent, ArcLength, Control
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
-from turgor.solver.volume import VolumeWalk
+from turgor.solver.volume import FEW_CUTS, LimitPoint, VolumeWalk
 
 log = logger("solver")
+
+SHORTER = 0.5
+"""Part of its length that a step is tried with where it has failed."""
 
 
 class Arc:
@@ -44,16 +47,44 @@ class Arc:
         self.direction = ahead * way / np.linalg.norm(way)
         walk.stand_at(here, before)
 
-    def advance_to(self, target: float, sign: float) -> Equilibrium | None:
-        """Return the next state, that at a volume where a step would pass it; ``None`` where even short steps fail."""
-        length, direction = self.length, self.direction
+    def stride_to(self, target: float, sign: float) -> tuple[Equilibrium, LimitPoint | None] | None:
+        """Go to the next state as :meth:`advance_to` and return it, with the limit of the load where one lies between.
+
+        What looks like a limit, but cannot be located, may be a step to another branch: shorter ones are tried, and
+        ``None`` is returned where even those lead to none.
+        """
+        walk, direction, length = self.walk, self.direction, self.length
+        here, before = walk.here, walk.before
+        while (found := self.advance_to(target, sign, length)) is not None:
+            length = SHORTER * float(np.linalg.norm(self._way(found)))
+            walk.stand_at(found, here, before)
+            if here.rising == found.rising or not self.is_flat(here, found):
+                return found, None
+            try:
+                limit = walk.limit_between(here, found)
+            except NotConvergedError as error:
+                log.info("arc-length step met no limit: %s", error.reason)
+                walk.failure = error
+                walk.stand_at(here, before)
+                self.direction = direction
+                continue
+            walk.stand_at(found, here)
+            return found, limit
+        return None
+
+    def advance_to(self, target: float, sign: float, length: float) -> Equilibrium | None:
+        """Return the state behind a step of at most a length, that at a volume where it would pass it, if there is one.
+
+        ``None`` where even short steps fail.
+        """
+        direction = self.direction
         while (found := self.advance(length)) is not None and sign * (self.walk.measure(found) - target) > 0.0:
             try:
                 return _cut(self.walk, found, target)
             except NotConvergedError as error:
                 self.walk.failure = error
                 self.direction = direction
-                length *= 0.5
+                length *= SHORTER
         return found
 
     def advance(self, length: float) -> Equilibrium | None:
@@ -65,15 +96,20 @@ class Arc:
             except NotConvergedError as error:
                 log.info("arc-length step failed: %s", error.reason)
                 self.walk.failure = error
-                length *= 0.5
+                length *= SHORTER
                 continue
             way = self._way(found)
             if float(way @ self.direction) <= 0.0:
                 log.info("arc-length step turned back")
-                length *= 0.5
+                length *= SHORTER
                 continue
-            if self.is_flat(here, found) and self.walk.is_doubtful(found, length / self.length):
-                length *= 0.5
+            part = length / self.length
+            if part > FEW_CUTS * self.walk.smallest_part and not self.keeps_inertia(here, found):
+                log.info("arc-length step may have led to another branch")
+                length *= SHORTER
+                continue
+            if self.is_flat(here, found) and self.walk.is_doubtful(found, part):
+                length *= SHORTER
                 continue
             self.direction = way / np.linalg.norm(way)
             return found
@@ -85,6 +121,16 @@ class Arc:
         tangents = [np.array([e.compliance / self.scale, 1.0]) for e in (first, second) if e.compliance is not None]
         (before, _), (after, _) = (tangent * np.sign(tangent @ way) for tangent in tangents)
         return bool(before * after > 0.0)
+
+    def keeps_inertia(self, first: Equilibrium, second: Equilibrium) -> bool:
+        """Whether the tangent's negative eigenvalues are as many at both ends of a step as one path makes expect.
+
+        One more or less where the load turns, not where the volume does; else the path bifurcates, or was left.
+        """
+        if first.negative_pivots is None or second.negative_pivots is None:
+            return True
+        turns = first.rising != second.rising and self.is_flat(first, second)
+        return abs(second.negative_pivots - first.negative_pivots) == turns
 
     def _at(self, length: float) -> Equilibrium:
         walk = self.walk

@@ -176,20 +176,16 @@ def follow_arc(
             if abs(walk.here.fraction) > LARGEST_LOAD:
                 raise out_of_reach(system, walk.here, part, f"the loads are {LARGEST_LOAD:g} times what they are given")
             previous = walk.here
-            found = arc.advance_to(target, sign)
-            if found is None:
+            stride = arc.stride_to(target, sign)
+            if stride is None:
                 raise _nowhere(walk)
+            found, limit = stride
             post.tally.count(found)
             if on_progress is not None:
                 on_progress((walk.measure(found) - rest) / (target - rest), found.iterations, found.residuals[-1])
-            before = walk.before
-            walk.stand_at(found, previous, before)
-            turns = previous.rising != found.rising
-            flat = arc.is_flat(previous, found)
-            if turns and flat:
-                post.send_limit(walk.limit_between(previous, found))
-                walk.stand_at(found, previous)
-            if flat or not turns:
+            if limit is not None:
+                post.send_limit(limit)
+            if previous.rising == found.rising or arc.is_flat(previous, found):
                 post.send_bifurcation(previous, found)
             # Behind a state that was delivered the count begins anew, as it does where a run is taken up there.
             taken = 0 if post.last is found else taken + 1
