@@ -26,12 +26,13 @@ def walked(full: float, change: float, length: float, **arch_options) -> list[Eq
     return follow_arc(system, Volume(ONE), target, length)
 
 
-@pytest.mark.parametrize(("rise", "full", "length"), [(1.4, 5e-4, 0.2), (1.45, 1e-4, 1.0)])
+@pytest.mark.parametrize(("rise", "full", "length"), [(1.4, 5e-4, 0.2), (1.45, 1e-4, 1.0), (1.5, 1e-4, 0.5)])
 def test_where_the_path_winds_no_step_goes_over_to_the_branch_that_it_crosses(rise, full, length):
     # Sucked through, the arch passes four limits; between them volume and pressure are again those near rest.
     limits = {
         1.4: (-1.8510e-4, -1.2001e-4, -2.0388e-4, -2.352e-5),
         1.45: (-1.9236e-4, -1.1257e-4, -2.2025e-4, -2.335e-5),
+        1.5: (-1.9942e-4, -1.0617e-4, -2.3739e-4, -2.318e-5),
     }
     found = walked(full, -17.0, length, rise=rise, above=False)
     kinds = (Event.LIMIT, Event.MINIMUM, Event.LIMIT, Event.MINIMUM)

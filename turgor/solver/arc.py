@@ -17,6 +17,14 @@ log = logger("solver")
 SHORTER = 0.5
 """Part of its length that a step is tried with where it has failed."""
 
+LARGEST_AREA = 0.5
+"""Area between the path along a step and its chord, in parts of the square over the chord, above which it has jumped.
+
+Half a circle makes 0.39; steps of arches, domes and balloons that kept to their path had up to 0.37, jumps more than 1.
+"""
+
+SAME = 1e-9
+
 
 class Arc:
     """Steps of a given length in the plane of volume and load fraction, each in the direction of the last one.
@@ -104,7 +112,7 @@ class Arc:
                 length *= SHORTER
                 continue
             part = length / self.length
-            if part > FEW_CUTS * self.walk.smallest_part and not self.keeps_inertia(here, found):
+            if part > FEW_CUTS * self.walk.smallest_part and self.may_have_jumped(here, found):
                 log.info("arc-length step may have led to another branch")
                 length *= SHORTER
                 continue
@@ -121,6 +129,34 @@ class Arc:
         tangents = [np.array([e.compliance / self.scale, 1.0]) for e in (first, second) if e.compliance is not None]
         (before, _), (after, _) = (tangent * np.sign(tangent @ way) for tangent in tangents)
         return bool(before * after > 0.0)
+
+    def may_have_jumped(self, first: Equilibrium, second: Equilibrium) -> bool:
+        """Whether a step may have gone over to another branch, by the inertia at its ends or by the energy."""
+        return not self.keeps_inertia(first, second) or self.area(first, second) > LARGEST_AREA
+
+    def area(self, first: Equilibrium, second: Equilibrium) -> float:
+        """Return the area between path and chord from one state to another, in parts of the square over the chord.
+
+        The potential falls along the path by the conjugate of all that grows, so it tells the area below the path; not
+        in the plane of another volume, nor where contact has been made stiffer on the way.
+        """
+        system, growth, ends = self.walk.system, self.walk.line.growth, (first, second)
+        (start, penalty, margin), (end, *same) = ((e.state, e.state.penalty, e.state.margin) for e in ends)
+        times = self._times()
+        if times is None or same != [penalty, margin]:
+            return 0.0
+        mean = 0.5 * (system.conjugate(start, growth) + system.conjugate(end, growth))
+        between = system.energy(start) - system.energy(end) - mean * (second.fraction - first.fraction)
+        way = self._way(second, first)
+        return abs(between / (times * self.scale)) / float(way @ way)
+
+    def _times(self) -> float | None:
+        """Return how many times the volume the conjugate of all that grows is, if it is that."""
+        growth, weights = self.walk.line.growth, self.walk.quantity.weights
+        if weights is None:
+            return 1.0
+        times = float(growth @ weights) / float(weights @ weights)
+        return times if times and np.allclose(growth, times * weights, rtol=SAME, atol=0.0) else None
 
     def keeps_inertia(self, first: Equilibrium, second: Equilibrium) -> bool:
         """Whether the tangent's negative eigenvalues are as many at both ends of a step as one path makes expect.
