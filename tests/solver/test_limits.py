@@ -225,6 +225,20 @@ def test_a_limit_that_is_none_is_not_located_where_its_ends_meet():
     assert walk.here is falling[-2]
 
 
+def test_what_a_jump_leads_to_is_no_state_of_the_path(monkeypatch):
+    def never(walk, first, second, tolerance=1e-6):
+        walk.stand_at(second, first)
+        raise NotConvergedError("the path jumps here")
+
+    monkeypatch.setattr(VolumeWalk, "limit_between", never)
+    system = arch(1.0)
+    found: list[Equilibrium] = []
+    with pytest.raises(StoppedShortError, match="the path jumps here"):
+        follow(system, Volume(ONE), volumes(system, 14.0, 5), on_equilibrium=found.append)
+    assert found
+    assert all(e.rising for e in found)
+
+
 @pytest.mark.parametrize("part", [0.95, 0.999])
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_load_just_below_the_limit_is_reached(part, steps):

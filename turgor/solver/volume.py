@@ -173,7 +173,7 @@ class VolumeWalk:
         Raises
         ------
         NotConvergedError
-            If a limit cannot be located however short the step.
+            If a limit cannot be located however short the step; the walk stands before it.
         """
         while True:
             here, before = self.here, self.before
@@ -184,9 +184,9 @@ class VolumeWalk:
                 point = self.limit_between(here, found)
             except NotConvergedError:
                 self.step = CUT * (self.measure(found) - self.measure(here))
+                self.stand_at(here, before)
                 if abs(self.step) < self.smallest_part * abs(self.first_step):
                     raise
-                self.stand_at(here, before)
                 continue
             self.stand_at(found, here)
             return found, point
