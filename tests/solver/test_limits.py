@@ -225,6 +225,24 @@ def test_a_limit_that_is_none_is_not_located_where_its_ends_meet():
     assert walk.here is falling[-2]
 
 
+@pytest.mark.parametrize(("steps", "largest"), [(1, 0.12), (6, 1.0)])
+def test_a_step_on_which_the_load_falls_at_once_is_no_step_along_the_path(steps, largest):
+    # The volume turns after 8.2 mm³, far from the target; slopes and mean over it are those of a monotone cubic.
+    system = arch(1e-4, rise=1.55, above=False)
+    rest = volumes(system, 0.0, 1)[-1]
+    found: list[Equilibrium] = []
+    with pytest.raises(StoppedShortError, match="no equilibrium was found beyond"):
+        follow(
+            system,
+            Volume(ONE),
+            volumes(system, -14.0, steps),
+            options=PathOptions(largest_step=largest),
+            on_equilibrium=found.append,
+        )
+    assert rest - system.conjugate(found[-1].state, ONE) == pytest.approx(8.2, abs=0.05)
+    assert found[-1].fraction < -1.0
+
+
 def test_what_a_jump_leads_to_is_no_state_of_the_path(monkeypatch):
     def never(walk, first, second, tolerance=1e-6):
         walk.stand_at(second, first)

@@ -7,6 +7,7 @@ import numpy as np
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.solver.apart import kept_apart
+from turgor.solver.area import area_to_chord
 from turgor.solver.control import AlongTangent, ArcLength, Control
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
@@ -22,8 +23,6 @@ LARGEST_AREA = 0.5
 
 Half a circle makes 0.39; steps of arches, domes and balloons that kept to their path had up to 0.37, jumps more than 1.
 """
-
-SAME = 1e-9
 
 
 class Arc:
@@ -132,31 +131,11 @@ class Arc:
 
     def may_have_jumped(self, first: Equilibrium, second: Equilibrium) -> bool:
         """Whether a step may have gone over to another branch, by the inertia at its ends or by the energy."""
-        return not self.keeps_inertia(first, second) or self.area(first, second) > LARGEST_AREA
-
-    def area(self, first: Equilibrium, second: Equilibrium) -> float:
-        """Return the area between path and chord from one state to another, in parts of the square over the chord.
-
-        The potential falls along the path by the conjugate of all that grows, so it tells the area below the path; not
-        in the plane of another volume, nor where contact has been made stiffer on the way.
-        """
-        system, growth, ends = self.walk.system, self.walk.line.growth, (first, second)
-        (start, penalty, margin), (end, *same) = ((e.state, e.state.penalty, e.state.margin) for e in ends)
-        times = self._times()
-        if times is None or same != [penalty, margin]:
-            return 0.0
-        mean = 0.5 * (system.conjugate(start, growth) + system.conjugate(end, growth))
-        between = system.energy(start) - system.energy(end) - mean * (second.fraction - first.fraction)
-        way = self._way(second, first)
-        return abs(between / (times * self.scale)) / float(way @ way)
-
-    def _times(self) -> float | None:
-        """Return how many times the volume the conjugate of all that grows is, if it is that."""
-        growth, weights = self.walk.line.growth, self.walk.quantity.weights
-        if weights is None:
-            return 1.0
-        times = float(growth @ weights) / float(weights @ weights)
-        return times if times and np.allclose(growth, times * weights, rtol=SAME, atol=0.0) else None
+        if not self.keeps_inertia(first, second):
+            return True
+        way, ends = self._way(second, first), (first, second)
+        area = area_to_chord(self.walk.system, self.walk.quantity.weights, self.walk.line.growth, ends)
+        return area > LARGEST_AREA * self.scale * float(way @ way)
 
     def keeps_inertia(self, first: Equilibrium, second: Equilibrium) -> bool:
         """Whether the tangent's negative eigenvalues are as many at both ends of a step as one path makes expect.

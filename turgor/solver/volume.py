@@ -17,6 +17,7 @@ from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
+from turgor.solver.area import area_to_chord
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
@@ -196,8 +197,8 @@ class VolumeWalk:
 
         `part` is its length over that of the first one.
         """
-        if self._may_have_snapped(found):
-            log.info("the step may have snapped")
+        if self._may_have_snapped(found) or self._has_left(found):
+            log.info("the step has left the path")
             return True
         if part > SHORT_ENOUGH and self._may_hide_limits(found):
             log.info("the step may hide limits")
@@ -360,6 +361,19 @@ class VolumeWalk:
         """
         ends = (self.here, found)
         return all(self.is_stable(end) for end in ends) and self._may_turn(found, self.quantity)
+
+    def _has_left(self, found: Equilibrium) -> bool:
+        """Whether the load's mean on the way to a state, by the energy, is one that no path with such ends has.
+
+        So it is where the volume turns and the step has gone over to what lies behind: the load falls at once, and a
+        cubic that does so is monotone.
+        """
+        ends = (self.here, found)
+        if not all(end.compliance for end in ends):
+            return False
+        change = abs(self._conjugate(found) - self._conjugate(self.here))
+        most = abs(found.fraction - self.here.fraction) + change * sum(abs(_slope_of_load(end)) for end in ends)
+        return area_to_chord(self.system, self.quantity.weights, self.line.growth, ends) > 0.5 * change * most
 
     def _may_hide_limits(self, found: Equilibrium) -> bool:
         """Whether the load, or what is watched, may have a maximum and a minimum on the way to a state, both hidden."""
