@@ -11,7 +11,7 @@ from turgor.solver.area import area_to_chord
 from turgor.solver.control import AlongTangent, ArcLength, Control
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
-from turgor.solver.volume import FEW_CUTS, LimitPoint, VolumeWalk
+from turgor.solver.volume import FEW_CUTS, SHORT_ENOUGH, LimitPoint, VolumeWalk
 
 log = logger("solver")
 
@@ -74,6 +74,8 @@ class Arc:
                 walk.failure = error
                 walk.stand_at(here, before)
                 self.direction = direction
+                if length < SHORT_ENOUGH * self.length:
+                    return None
                 continue
             walk.stand_at(found, here)
             return found, limit

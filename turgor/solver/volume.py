@@ -47,7 +47,7 @@ SMALLEST_PART = 1e-3
 
 MONOTONE = 3.0
 SHORT_ENOUGH = 0.01
-"""Part of the first step below which a step is not shortened for what it may hide."""
+"""Part of the first step below which none is shortened for what it may hide, or along an arc for a limit not found."""
 
 FEW_CUTS = 4.0
 """So many smallest steps long, one that ends in an unstable state is tried shorter: it may be on another branch. So is
