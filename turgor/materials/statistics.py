@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from turgor.materials.kinematics import Array
 
@@ -53,6 +53,6 @@ def statistics(jacobian: Array, residuals: Sequence[Array]) -> Statistics:
             spread = (Vt.T / s) @ (U * root[:, None]).T
             covariance = spread @ spread.T
             deviation = np.sqrt(np.diag(covariance))
-            half_widths = student_t.ppf(0.5 + LEVEL / 2.0, n - k) * deviation / norms
+            half_widths = stdtrit(n - k, 0.5 + LEVEL / 2.0) * deviation / norms
             correlation = covariance / np.outer(deviation, deviation)
     return Statistics(half_widths, correlation, logarithm + 2.0 * p, float(logarithm + p * np.log(n)))
