@@ -10,7 +10,6 @@ import pytest
 from turgor.common.errors import InputError
 from turgor.materials.compressible import free_response
 from turgor.materials.registry import create
-from turgor.mesh.structured import box
 from turgor.solver.path import solve_path
 from turgor.study.build import system_of
 from turgor.study.export.calculix import inp_model
@@ -59,16 +58,8 @@ def test_a_compressible_ball_swells_as_in_turgor(ball, octant, tmp_path):
 
 @needs_calculix
 @pytest.mark.parametrize("model", STRETCHING)
-def test_every_model_stretches_a_bar_as_its_formula_says(model, ball, tmp_path):
-    bar = box((1.0, 1.0, 1.0), (1, 1, 1))
-    corner = int(bar.points.sum(axis=1).argmax())
-    bar = type(bar)(bar.points, bar.cells, surfaces=bar.surfaces, markers={"tip": [corner]})
-    case = ball(
-        supports=[{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")]
-        + [{"type": "displacement", "surface": "x1", "x": "0.5 mm"}],
-        loads=[{"type": "traction", "surface": "x1", "value": "1e-9 MPa", "direction": [1, 0, 0]}],
-        solver={"steps": 1},
-    )
+def test_every_model_stretches_a_bar_as_its_formula_says(model, stretched, tmp_path):
+    case, bar, corner = stretched
     material = create(model, STRETCHING[model], poisson=0.45)
     lateral, _ = free_response(material, "uniaxial", np.array([1.5]))
     moved = solved(lines_of(case, bar, body=material), tmp_path)[corner]
@@ -78,26 +69,9 @@ def test_every_model_stretches_a_bar_as_its_formula_says(model, ball, tmp_path):
 
 
 @needs_calculix
-def test_weight_and_a_force_pull_a_bar(ball, tmp_path):
-    bar = box((1.0, 1.0, 10.0), (1, 1, 4))
-    end = int(bar.points.sum(axis=1).argmax())
-    bar = type(bar)(bar.points, bar.cells, surfaces=bar.surfaces, markers={"tip": [end]})
-    case = ball(
-        materials={
-            "body": {
-                "model": "neo-hookean", "constants": {"C10": "0.05 MPa"}, "poisson": 0.2, "density": "1e-8 t/mm^3"
-            }
-        },
-        supports=[{"type": "sliding", "surface": name} for name in ("x0", "y0", "z0")],
-        loads=[
-            {"type": "gravity", "direction": [0, 0, 1], "acceleration": "1000 mm/s^2"},
-            {"type": "force", "surface": "z1", "value": "1e-4 N", "direction": [0, 0, 1]},
-        ],
-        solver={"steps": 1},
-    )  # fmt: skip
-    moved = solved(lines_of(case, bar), tmp_path)[end]
-    # Small strains: u = (F L + ρ g L² / 2) / E with E = 2 μ (1 + ν) = 0.24 MPa on 1 mm².
-    assert moved[2] == pytest.approx((1e-4 * 10 + 1e-8 * 1000 * 50) / 0.24, rel=0.01)
+def test_weight_and_a_force_pull_a_bar(hanging, tmp_path):
+    case, bar, end, expected = hanging
+    assert solved(lines_of(case, bar), tmp_path)[end][2] == pytest.approx(expected, rel=0.01)
 
 
 def test_each_state_is_the_end_of_a_step(ball, octant):

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from turgor.common.errors import InputError
+from turgor.materials.compressible import free_response
 from turgor.materials.registry import create
 from turgor.mesh.structured import box
 from turgor.solver.path import solve_path
 from turgor.study.build import system_of
-from turgor.study.export.febio import feb_model
+from turgor.study.export.febio import Stepping, feb_model
 from turgor.study.export.problem import problem_of
 from turgor.study.materials import build_materials
 
@@ -53,6 +54,7 @@ def test_every_name_and_number_that_is_used_is_defined(ball, octant):
     for domain in model.find("MeshDomains"):
         assert domain.get("name") in names["Elements"]
         assert domain.get("mat") in materials
+        assert domain.get("elem_type") == "TET10G4"
     assert {condition.get("node_set") for condition in model.find("Boundary")} == {"x0", "y0", "z0"} <= names["NodeSet"]
     surfaces = {load.get("surface") for load in model.find("Loads").findall("surface_load")}
     assert surfaces == {"cavity", "outer"} <= names["Surface"]
@@ -82,7 +84,7 @@ def test_constants_are_in_febios_conventions(ball, octant):
     case = ball()
     kind, constants = constants_of(written(case, octant, body=create("yeoh-3", {"C10": 1, "C20": 2, "C30": 3}, D1=1.0)))
     assert kind == "Yeoh"
-    assert constants == {"density": 1e-9, "c1": 1.0, "c2": 2.0, "c3": 3.0, "k": 2.0, "pressure_model": 2.0}
+    assert constants == {"density": 1e-9, "c1": 1.0, "c2": 4.0, "c3": 9.0, "k": 2.0, "pressure_model": 2.0}
     kind, constants = constants_of(written(case, octant, body=create("ogden-1", {"mu1": 0.3, "alpha1": 4.0}, D1=1.0)))
     assert (kind, constants["c1"], constants["m1"]) == ("Ogden", 0.6, 4.0)
     kind, constants = constants_of(written(case, octant, body=create("neo-hookean", {"C10": 0.3})))
@@ -94,16 +96,63 @@ def test_constants_are_in_febios_conventions(ball, octant):
         written(case, octant, body=create("arruda-boyce", {"mu": 0.1, "lambda_m": 2.0}))
 
 
-@pytest.mark.skipif(shutil.which("febio4") is None, reason="FEBio is not installed")
-def test_febio_swells_a_compressible_ball_as_turgor(ball, octant, tmp_path):
-    case = ball()
-    (tmp_path / "ball.feb").write_text(written(case, octant))
-    run = subprocess.run(
-        ["febio4", "-i", "ball.feb"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
-    )
+def test_steps_and_tolerance_can_be_given(ball, octant):
+    problem = problem_of(ball(), octant, build_materials(ball().materials)[0], "FEBio")
+    model = ElementTree.fromstring("\n".join(feb_model(problem, Stepping(0.25, force_tolerance=1e-3))))
+    control = model.find("Control")
+    assert (control.find("time_steps").text, control.find("step_size").text) == ("4", "0.25")
+    assert [pt.text.split(",")[1] for pt in model.find("LoadData")[1].iter("pt")] == ["0.25"] * 3
+    solver = control.find("solver")
+    assert [float(solver.find(f"{of}tol").text) for of in "der"] == [0.0, 0.0, pytest.approx(1e-6)]
+
+
+needs_febio = pytest.mark.skipif(shutil.which("febio4") is None, reason="FEBio is not installed")
+
+STRETCHING = {
+    "neo-hookean": {"C10": 0.05},
+    "mooney-rivlin-2": {"C10": 0.04, "C01": 0.01},
+    "yeoh-2": {"C10": 0.05, "C20": 0.01},
+    "yeoh-3": {"C10": 0.05, "C20": 0.01, "C30": 0.003},
+    "ogden-1": {"mu1": 0.1, "alpha1": 3.0},
+    "ogden-3": {"mu1": 0.05, "alpha1": 1.3, "mu2": 0.03, "alpha2": 4.0, "mu3": 0.02, "alpha3": -2.0},
+    "gent": {"mu": 0.1, "Jm": 10.0},
+    "hencky": {"mu": 0.1},
+}
+
+
+def solved(text, node, folder):
+    """Return the displacement that FEBio prints last for a node."""
+    (folder / "model.feb").write_text(text)
+    command = ["febio4", "-i", "model.feb"]
+    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     assert "N O R M A L" in run.stdout, run.stdout[-2000:]
-    rows = re.findall(rf"^{octant.marker('tip')[0] + 1} (\S+) (\S+) (\S+)$", (tmp_path / "ball.log").read_text(), re.M)
+    rows = re.findall(rf"^{node + 1} (\S+) (\S+) (\S+)$", (folder / "model.log").read_text(), re.MULTILINE)
+    return np.array(rows[-1], dtype=float)
+
+
+@needs_febio
+def test_a_compressible_ball_swells_as_in_turgor(ball, octant, tmp_path):
+    case, tip = ball(), int(octant.marker("tip")[0])
     states = []
     solve_path(system_of(case, octant, build_materials(case.materials)[0]), [1.0], on_equilibrium=states.append)
-    expected = states[-1].state.u[octant.marker("tip")[0]]
-    np.testing.assert_allclose(np.array(rows[-1], dtype=float), expected, atol=0.01 * expected[2])
+    expected = states[-1].state.u[tip]
+    assert expected[2] > 0.2
+    np.testing.assert_allclose(solved(written(case, octant), tip, tmp_path), expected, atol=1e-6)
+
+
+@needs_febio
+@pytest.mark.parametrize("model", STRETCHING)
+def test_every_model_stretches_a_bar_as_its_formula_says(model, stretched, tmp_path):
+    case, bar, corner = stretched
+    material = create(model, STRETCHING[model], poisson=0.45)
+    lateral, _ = free_response(material, "uniaxial", np.array([1.5]))
+    moved = solved(written(case, bar, body=material), corner, tmp_path)
+    # Hencky's law of the volume change is another one there, equal to second order only.
+    tolerance = 2e-3 if model == "hencky" else 2e-6
+    np.testing.assert_allclose(moved, [0.5, lateral[0] - 1, lateral[0] - 1], atol=tolerance)
+
+
+@needs_febio
+def test_weight_and_a_force_pull_a_bar(hanging, tmp_path):
+    case, bar, end, expected = hanging
+    assert solved(written(case, bar), end, tmp_path)[2] == pytest.approx(expected, rel=0.01)

@@ -7,6 +7,7 @@ must-points, so that each state that the case asks for is hit exactly and stored
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 from turgor.common.errors import InputError
@@ -21,19 +22,33 @@ from turgor.study.export.problem import Problem
 PROGRAM = "FEBio"
 
 _AXES = "xyz"
-_LONGEST_STEP, _RETRIES = 0.1, 10
+_RETRIES = 10
+_RULE = "TET10G4"
+"""The four integration points of Turgor's tetrahedra; FEBio's own choice is eight."""
 _LOAD, _MUST_POINTS = 1, 2
 _WATER = 1e-9
 """Density in t/mm³ where the case gives none: without weight nothing depends on it, and FEBio wants one."""
 
 
-def feb_model(problem: Problem) -> Iterator[str]:
+@dataclass(frozen=True)
+class Stepping:
+    """How FEBio goes to the load.
+
+    ``longest`` is the largest part of the load in a step, ``force_tolerance`` the norm of the residual over that at a
+    step's beginning at which the step has converged; without it FEBio's own criteria hold, of displacements and energy.
+    """
+
+    longest: float = 0.1
+    force_tolerance: float | None = None
+
+
+def feb_model(problem: Problem, stepping: Stepping = Stepping()) -> Iterator[str]:
     """Yield the lines of the model; raise InputError for a material that FEBio does not have."""
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f"<!-- {problem.name.replace('--', '- -')}, written by Turgor. Units: mm, N, MPa, t, s. -->"
     yield '<febio_spec version="4.0">'
     yield '<Module type="solid"/>'
-    yield from _control(problem)
+    yield from _control(problem, stepping)
     yield "<Material>"
     for number, (name, material) in enumerate(problem.materials.items(), start=1):
         yield from _material(material, number, name)
@@ -43,7 +58,7 @@ def feb_model(problem: Problem) -> Iterator[str]:
     for name, material in problem.materials.items():
         # One constant pressure an element, as in Turgor; the other materials of FEBio are not split that way.
         kind = "elastic-solid" if isinstance(material, Hencky) else "three-field-solid"
-        yield f'<SolidDomain name={quoteattr(name)} mat={quoteattr(name)} type="{kind}"/>'
+        yield f'<SolidDomain name={quoteattr(name)} mat={quoteattr(name)} type="{kind}" elem_type="{_RULE}"/>'
     yield "</MeshDomains>"
     yield "<Boundary>"
     yield from _boundary(problem)
@@ -51,7 +66,7 @@ def feb_model(problem: Problem) -> Iterator[str]:
     yield "<Loads>"
     yield from _loads(problem)
     yield "</Loads>"
-    yield from _load_data(problem)
+    yield from _load_data(problem, stepping.longest)
     yield '<Output><plotfile type="febio"><var type="displacement"/><var type="stress"/></plotfile>'
     watched = [str(nodes[0] + 1) for nodes in problem.points_of_interest.values()]
     if watched:
@@ -65,16 +80,19 @@ def _begin(problem: Problem) -> float:
     return 0.0 if problem.weight is None else 1.0
 
 
-def _control(problem: Problem) -> Iterator[str]:
-    steps = round((_begin(problem) + 1.0) / _LONGEST_STEP)
+def _control(problem: Problem, stepping: Stepping) -> Iterator[str]:
+    steps, longest = round((_begin(problem) + 1.0) / stepping.longest), stepping.longest
     yield "<Control>"
     yield "<analysis>STATIC</analysis>"
-    yield f"<time_steps>{steps}</time_steps><step_size>{_LONGEST_STEP}</step_size>"
+    yield f"<time_steps>{steps}</time_steps><step_size>{longest!r}</step_size>"
     yield "<plot_level>PLOT_MUST_POINTS</plot_level>"
     yield f'<time_stepper type="default"><max_retries>{_RETRIES}</max_retries><opt_iter>15</opt_iter>'
-    yield f'<dtmin>1e-5</dtmin><dtmax lc="{_MUST_POINTS}">{_LONGEST_STEP}</dtmax></time_stepper>'
-    # Full Newton: the matrix is made anew in every iteration.
+    yield f'<dtmin>1e-5</dtmin><dtmax lc="{_MUST_POINTS}">{longest!r}</dtmax></time_stepper>'
     yield '<solver type="solid"><symmetric_stiffness>symmetric</symmetric_stiffness><max_refs>25</max_refs>'
+    if stepping.force_tolerance is not None:
+        # FEBio compares squares of norms.
+        yield f"<dtol>0</dtol><etol>0</etol><rtol>{stepping.force_tolerance**2!r}</rtol>"
+    # Full Newton: the matrix is made anew in every iteration.
     yield '<qn_method type="BFGS"><max_ups>0</max_ups></qn_method></solver>'
     yield "</Control>"
 
@@ -82,9 +100,10 @@ def _control(problem: Problem) -> Iterator[str]:
 def _material(material: Hyperelastic, number: int, name: str) -> Iterator[str]:
     """Yield a material.
 
-    FEBio's Ogden has W = Σ c/m² (Σ λ̄^m − 3), so c = 2 μ in our (Abaqus's) convention. Of the laws of the volume change
-    number 2 is K/2 (J − 1)². Its Arruda and Boyce differs from the published series: every term but the first counts
-    its power twice.
+    FEBio's Ogden has W = Σ c/m² (Σ λ̄^m − 3), so c = 2 μ in our (Abaqus's) convention. Its Yeoh takes Σ cᵢ (Ī₁ −
+    3)^(i−1) for ∂W/∂Ī₁, so cᵢ = i Cᵢ₀, though its energy has W = Σ cᵢ (Ī₁ − 3)^i (FEBio 4.11, FEYeoh.cpp). Of the laws
+    of the volume change number 2 is K/2 (J − 1)². Its Arruda and Boyce differs from the published series: every term
+    but the first counts its power twice.
     """
     if material.volumetric.name != "quadratic":
         problem = f"this law of the volume change is not written for {PROGRAM}"
@@ -105,7 +124,7 @@ def _kind_and_constants(material: Hyperelastic, key: str) -> tuple[str, dict[str
     if isinstance(material, PolynomialModel) and set(material.powers) <= {(1, 0), (0, 1)}:
         return "Mooney-Rivlin", {"c1": given["C10"], "c2": given.get("C01", 0.0)}
     if isinstance(material, PolynomialModel) and all(j == 0 for _, j in material.powers):
-        return "Yeoh", {f"c{i}": given[f"C{i}0"] for i, _ in material.powers}
+        return "Yeoh", {f"c{i}": i * given[f"C{i}0"] for i, _ in material.powers}
     if isinstance(material, OgdenModel):
         return "Ogden", {
             name: value
@@ -151,13 +170,13 @@ def _loads(problem: Problem) -> Iterator[str]:
         yield f'<body_load name="weight" type="body force"><force>{against}</force></body_load>'
 
 
-def _load_data(problem: Problem) -> Iterator[str]:
+def _load_data(problem: Problem, longest_step: float) -> Iterator[str]:
     begin = _begin(problem)
     yield "<LoadData>"
     loaded = [(0.0, 0.0), (begin, 0.0), (begin + 1.0, 1.0)] if begin else [(0.0, 0.0), (1.0, 1.0)]
     yield from _curve(_LOAD, "LINEAR", loaded)
     times = [0.0, *([begin] if begin else []), *(begin + fraction for fraction in problem.fractions)]
-    yield from _curve(_MUST_POINTS, "STEP", [(time, _LONGEST_STEP) for time in times])
+    yield from _curve(_MUST_POINTS, "STEP", [(time, longest_step) for time in times])
     yield "</LoadData>"
 
 
