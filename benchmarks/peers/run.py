@@ -29,6 +29,9 @@ RESULTS = HERE / "results"
 LONGEST_S = 1800
 """A peer that takes longer than this on one mesh has failed."""
 
+PATH = os.pathsep.join([os.environ["PATH"], str(HERE / ".peers" / "febio" / "bin")])
+"""Where the programs are: what `install.sh` builds stands behind what is there already."""
+
 ONCE_S = 120
 """A run that takes longer than this is not repeated."""
 
@@ -56,7 +59,7 @@ class Peer:
 
     def missing(self) -> str | None:
         """Return why the peer cannot run, ``None`` if it can."""
-        if self.program and shutil.which(self.program) is None:
+        if self.program and shutil.which(self.program, path=PATH) is None:
             return f"`{self.program}` is not on the path"
         if self.environment and not self.python.exists():
             return f"not installed: `sh benchmarks/peers/install.sh {self.environment}`"
@@ -99,6 +102,7 @@ PEERS = {
         cases=IN_ROWS,
     ),
     "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
+    "febio": Peer("FEBio", "with_febio.py", program="febio4", cases=("tube", "tube-quarter")),
 }
 
 
@@ -145,7 +149,7 @@ def measured(peer: Peer, mesh: Path, warm_up: Path) -> dict[str, object]:
         return {"failure": reason}
     threads = str(2 // peer.ranks)
     names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
-    environment = os.environ | dict.fromkeys(names, threads)
+    environment = os.environ | {"PATH": PATH} | dict.fromkeys(names, threads)
     try:
         done = subprocess.run(
             peer.command(mesh, warm_up), env=environment, capture_output=True, text=True, timeout=LONGEST_S, check=False

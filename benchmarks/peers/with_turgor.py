@@ -20,6 +20,7 @@ from turgor.fem.loads import Pressure
 from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Prescribed
 from turgor.fem.system import System
+from turgor.materials import Hyperelastic
 from turgor.materials.registry import create
 from turgor.mesh import Mesh
 from turgor.solver.newton import NewtonOptions
@@ -31,13 +32,19 @@ SECTIONS = {"space": None, "plane-strain": PlaneStrain(), "axisymmetric": Axisym
 
 def system_of(case: Case) -> System:
     """Return the case as a model of Turgor's."""
-    mesh = Mesh(case.points, case.cells, surfaces=case.surfaces)
-    rubber = create("neo-hookean", {"C10": f"{case.mu / 2} MPa"}, bulk_modulus=f"{case.bulk} MPa")
     supports = [
         Prescribed(name, tuple(None if np.isnan(u) else float(u) for u in value)) for name, value in case.held.items()
     ]
     loads = [Pressure("cavity", case.pressure)] if case.has_cavity else []
-    return System(mesh, {"body": rubber}, supports, loads, section=SECTIONS[case.kind])
+    return System(mesh_of(case), {"body": rubber_of(case)}, supports, loads, section=SECTIONS[case.kind])
+
+
+def mesh_of(case: Case) -> Mesh:
+    return Mesh(case.points, case.cells, surfaces=case.surfaces, markers={"tip": np.array([case.tip])})
+
+
+def rubber_of(case: Case) -> Hyperelastic:
+    return create("neo-hookean", {"C10": f"{case.mu / 2} MPa"}, bulk_modulus=f"{case.bulk} MPa")
 
 
 @dense_products_on_one_thread()
