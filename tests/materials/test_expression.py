@@ -42,6 +42,7 @@ def test_known_models_come_out_the_same():
     assert written.shear_modulus == pytest.approx(0.1)
 
 
+ALPHA = {"mu": {"unit": "MPa"}, "alpha": {"start": [2.0]}}
 MODULI = {"mu": {"unit": "MPa"}, "c": {"unit": "MPa"}}
 
 
@@ -110,6 +111,12 @@ def test_a_body_of_a_rough_energy_is_stretched_from_rest():
     state = solve_path(system, [1.0])[-1].state
     pull = system.forces(state)[0][block.points[:, 2] > 0.99, 2].sum()
     assert pull == pytest.approx(float(material.uniaxial(1.2)), rel=1e-3)
+
+
+def test_constants_without_an_energy_are_refused():
+    kind = model("2*mu/alpha**2*(lambda1**alpha + lambda2**alpha + lambda3**alpha - 3)", **ALPHA)
+    with pytest.raises(InputError, match=r"mine give an initial shear modulus of nan"):
+        kind(mu=0.1, alpha=0.0)
 
 
 def test_functions_that_cannot_be_evaluated_are_refused_by_name(monkeypatch):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from turgor.materials import create
+from turgor.materials.expression import define_model
 from turgor.materials.library import get
 from turgor.materials.registry import models
 from turgor.materials.stability import (
@@ -140,6 +141,28 @@ def test_a_material_locks_where_its_chains_are_at_their_end(name):
     assert stable_up_to(material, 6.0)
     assert locking(material, 0.95, 1.05) == {}
     assert locking(create("neo-hookean", {"C10": 0.1})) == {}
+
+
+@pytest.mark.parametrize(
+    "energy",
+    [
+        "-mu*Jm/2*log(1 - (I1 - 3)/Jm)",  # no value beyond
+        "-mu*Jm/2*log(1 - (lambda1**2 + lambda2**2 + lambda3**2 - 3)/Jm)",
+        "mu/2*(I1 - 3)/(1 - (I1 - 3)/Jm)",  # a pole, with values beyond that nothing comes to
+        "mu/2*(I1 - 3)/(1 - (I1 - 3)/Jm)**2",
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_an_energy_of_the_users_own_locks_as_the_packages_do(energy):
+    constants = {"mu": {"unit": "MPa"}, "Jm": {"start": [1.0]}}
+    kind = define_model({"name": "mine", "energy": energy, "constants": constants})
+    material, gent = kind(mu=0.1, Jm=1.0), create("gent", LOCKS["gent"])
+    assert verdict(material).stable
+    assert str(verdict(material)) == str(verdict(gent))
+    beyond = np.array([1.7, 3.0])
+    assert np.all(np.isnan(material.uniaxial(beyond)))
+    assert np.all(np.isposinf(material.principal(principal_stretches("uniaxial", beyond))[0]))
+    assert np.all(np.isfinite(material.uniaxial(np.array([0.6, 1.0, 1.6]))))
 
 
 @pytest.mark.parametrize("name", LOCKS)

@@ -58,19 +58,39 @@ _FORMAT = "a mapping with name, energy and constants"
 
 
 class Program:
-    """Numerical values of several sympy expressions of the same variables, common parts computed once."""
+    """Numerical values of an energy and its derivatives, common parts computed once.
 
-    def __init__(self, expressions: Sequence[Any]) -> None:
+    The body cannot go beyond a pole of its energy, or where this has no real value, as beyond the limiting stretch of a
+    logarithm: there the energy is infinite and its derivatives are NaN, as those of Gent's model are.
+
+    Parameters
+    ----------
+    expressions
+        The energy and its derivatives, of sympy.
+    insides
+        Of the same variables; positive on this side of each pole.
+    """
+
+    def __init__(self, expressions: Sequence[Any], insides: Sequence[Any]) -> None:
         sympy = require("sympy", "a model from a strain-energy expression")
-        self._shared, self._results = sympy.cse(list(expressions))
+        self._shared, self._results = sympy.cse([*expressions, *insides])
+        self._count = len(expressions)
 
     def __call__(self, values: Mapping[str, Array | float]) -> list[Array]:
         """Return the values of all expressions, each of the common shape of `values`."""
-        known: dict[str, Any] = dict(values)
-        for symbol, expression in self._shared:
-            known[str(symbol)] = _evaluate(expression, known)
+        # Numpy's numbers: what Python does not divide, it makes infinite.
+        known: dict[str, Any] = {name: np.asarray(value, dtype=float) for name, value in values.items()}
         shape = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-        return [np.array(np.broadcast_to(_evaluate(result, known), shape), dtype=float) for result in self._results]
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            for symbol, expression in self._shared:
+                known[str(symbol)] = _evaluate(expression, known)
+            found = [_evaluate(result, known) for result in self._results]
+        found = [np.array(np.broadcast_to(value, shape), dtype=float) for value in found]
+        (energy, *rest), insides = found[: self._count], found[self._count :]
+        beyond = functools.reduce(np.logical_or, [inside <= 0.0 for inside in insides], np.isnan(energy))
+        if not np.any(beyond):
+            return [energy, *rest]
+        return [np.where(beyond, np.inf, energy), *(np.where(beyond, np.nan, part) for part in rest)]
 
 
 def _evaluate(expression: Any, known: Mapping[str, Any]) -> Any:
@@ -299,13 +319,15 @@ def _differentiate(energy: Any, basis: tuple[str, ...], moduli: Sequence[str]) -
     if basis == INVARIANTS:
         excesses = [sympy.Symbol(name, nonnegative=True) for name in EXCESSES]
         W, x = energy.subs({invariant: 3 + y for invariant, y in zip(x, excesses, strict=True)}), excesses
-    at_rest = W.subs(dict.fromkeys(x, AT_REST if basis == INVARIANTS else 1))
+    at_rest = dict.fromkeys(x, AT_REST if basis == INVARIANTS else 1)
     first = [sympy.diff(W, variable) for variable in x]
     pairs = itertools.combinations_with_replacement(range(len(x)), 2)
     second = [sympy.diff(first[i], x[j]) for i, j in pairs]
-    expressions = [W - at_rest, *first, *second]
+    expressions = [W - W.subs(at_rest), *first, *second]
     _check_evaluated(expressions, energy)
-    return Program(expressions), InvariantExpression if basis == INVARIANTS else StretchExpression
+    poles = [power.base for power in W.atoms(sympy.Pow) if power.exp.could_extract_minus_sign()]
+    insides = [base * base.subs(at_rest) for base in poles if base.free_symbols & set(x)]
+    return Program(expressions, insides), InvariantExpression if basis == INVARIANTS else StretchExpression
 
 
 def _check_linear(energy: Any, moduli: Sequence[str]) -> None:
