@@ -66,6 +66,13 @@ def test_linear_model_solves_the_normal_equations(shared_data):
     assert found.rmse == pytest.approx(found.residual_norm / np.sqrt(len(x)))
 
 
+@pytest.mark.parametrize(("factor", "word"), [(1e6, "stiffer"), (1e-6, "softer"), (1.0, None)])
+def test_stresses_of_another_unit_are_doubted(factor, word):
+    material = create("neo-hookean", {"C10": 0.1 * factor})
+    (test,) = fit(synthetic(material, ["uniaxial"]), "neo-hookean").tests
+    assert [f"{word} than elastomers are; check the unit" in text for text in test.warnings] == [True] * bool(word)
+
+
 def test_fits_are_deterministic(shared_data):
     file = shared_data / "tensile" / "Ecoflex 00-35 FAST.csv"
     assert fit(file, "ogden-3").as_dict() == fit(file, "ogden-3").as_dict()

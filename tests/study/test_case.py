@@ -144,6 +144,16 @@ def test_materials_take_their_volume_change_and_density(small_tube: Path) -> Non
     assert materials["body"].shear_modulus == pytest.approx(0.1)
 
 
+def test_what_is_doubtful_in_tests_is_told(small_tube: Path, caplog: pytest.LogCaptureFixture) -> None:
+    curve = "strain,stress (MPa)\n" + "".join(f"{0.1 * k},{1e4 * k}\n" for k in range(8))
+    small_tube.with_name("pull.csv").write_text(curve, encoding="utf-8")
+    change = "materials.body={fit: pull.csv, models: [neo-hookean], specimen: {strain_source: crosshead}}"
+    build_materials(load_case(small_tube, [change]).materials)
+    crosshead, unit = caplog.messages
+    assert "pull.csv: the strain comes from the crosshead" in crosshead
+    assert "pull.csv: the stress is up to 7e+04 MPa at strains up to 0.7: stiffer than elastomers are" in unit
+
+
 def test_the_library_material_can_be_given_a_density(small_tube: Path) -> None:
     change = "materials.body={library: ecoflex-00-30-yeoh, density: 2 g/cm^3}"
     materials, _ = build_materials(load_case(small_tube, [change]).materials)

@@ -154,7 +154,7 @@ def _tests(data: Data | Sequence[Data], specimen: Specimen | None) -> tuple[Mate
     for test in tests:
         if not len(test.stretch):
             raise InputError("a test without points", file=test.file or None, key="data", expected="some points")
-    return tuple(tests)
+    return tuple(test.doubted for test in tests)
 
 
 def _factors(tests: Sequence[MaterialTest], weights: Sequence[float] | None) -> tuple[float, ...]:

@@ -20,6 +20,10 @@ TOE_SPAN = 0.1
 TOE_LIMIT = 0.005
 """A toe of less strain is not worth a word."""
 
+USUAL_STIFFNESS = (1e-3, 1e3)
+"""Stress over strain in MPa, from the softest gels to plastics harder than any elastomer; a slip of the stress's unit
+by a factor of a million leads out of it."""
+
 CROSSHEAD_WARNING = (
     "the strain comes from the crosshead: the specimen's shoulders and its slip in the grips count as strain of the "
     "gauge, so that stiffness comes out typically 20–50 % too low; give the effective gauge length or a known modulus "
@@ -67,6 +71,20 @@ class MaterialTest:
     def has_lateral(self) -> bool:
         """Whether the lateral stretch was measured anywhere."""
         return self.lateral is not None and bool(np.any(np.isfinite(self.lateral)))
+
+    @property
+    def doubted(self) -> MaterialTest:
+        """The test, with a warning where its stress is so large or small that the unit is likely to be another one."""
+        strain, stress = (float(np.abs(part).max()) for part in (self.deformation, self.stress))
+        low, high = USUAL_STIFFNESS
+        if self.mode == "volumetric" or not strain or low <= stress / strain <= high:
+            return self
+        doubt = (
+            f"the stress is up to {stress:.3g} MPa at strains up to {strain:.3g}: "
+            f"{'softer' if stress / strain < low else 'stiffer'} than elastomers are; check the unit of the stress, or "
+            "those of the force and the cross-section"
+        )
+        return replace(self, warnings=(*self.warnings, doubt))
 
     def within(self, low: float, high: float) -> MaterialTest:
         """Return the part of the test between two engineering strains.

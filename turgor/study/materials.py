@@ -245,6 +245,9 @@ def build_materials(
             if isinstance(choice, FittedMaterial):
                 found = choice.fitted()
                 first = first or found
+                for test in found.tests:
+                    for text in test.warnings:
+                        log.warning("%s: %s", test.file, text)
                 materials[region] = choice.build(found)
             else:
                 materials[region] = choice.build()
