@@ -56,6 +56,7 @@ def test_a_body_of_revolution_runs_from_a_case_file(tmp_path: Path) -> None:
     # Marker by marker the error is that of the tip, in per cent of the height, where there is a measurement.
     assert [entry["marker_rmse_percent"] is None for entry in rows] == [True, False, True]
     assert rows[1]["marker_rmse_percent"] == pytest.approx(100.0 * rows[1]["tip_displacement_y_mm"] / height, rel=0.02)
+    assert "marker_rmse" not in (done.folder / "run.log").read_text(encoding="utf-8")
     # The resolved case stands on its own copy of the table, and is resumed without a step.
     (tmp_path / "tips.csv").unlink()
     again = run(load_case(done.folder / "case.yaml"), done.folder, resume=True)
@@ -63,6 +64,19 @@ def test_a_body_of_revolution_runs_from_a_case_file(tmp_path: Path) -> None:
     stored = json.loads((done.folder / "store.json").read_text(encoding="utf-8"))
     assert stored["section"] == {"kind": "axisymmetric", "thickness": None}
     assert stored["measures"][3]["marker_rmse"]["file"] == "data/tips.csv"
+
+
+@pytest.mark.usefixtures("unreported")
+def test_a_comparison_with_no_measured_state_is_told(tmp_path: Path) -> None:
+    height = tg.Bellows(convolutions=1).height
+    case = tmp_path / "bellows.yaml"
+    case.write_text(BELLOWS.replace("TIP", f"{height!r} mm"), encoding="utf-8")
+    table = f"pressure (kPa),marker,x (mm),y (mm),z (mm)\n7,1,0,{height},0\n20,1,0,{height},0\n"
+    (tmp_path / "tips.csv").write_text(table, encoding="utf-8")
+    done = run(load_case(case), tmp_path / "run")
+    told = (done.folder / "run.log").read_text(encoding="utf-8")
+    assert "measures.marker_rmse: marker_rmse_percent is empty in every step; 'tips.csv' has what was measured" in told
+    assert "at 7, 20 kPa" in told
 
 
 def tube_wall() -> Mesh:

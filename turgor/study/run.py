@@ -21,7 +21,7 @@ from turgor.common.writing import UnwritableError
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
-from turgor.results.measures import check_kinds
+from turgor.results.measures import check_kinds, silent
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore, check_place
@@ -158,6 +158,8 @@ class _Running:
                 stop = self._walk(system, course, store)
                 summary = self._summary(system, store, stop, spent)
                 store.finish(summary)
+                for text in silent(self.case.measures or (), store.history):
+                    log.warning(text)
         self.show.stage("report")
         report(self.folder)
         return Run(self.folder, summary)

@@ -5,7 +5,17 @@ columns of ``history.csv`` and entries of ``summary.json``.
 """
 
 from turgor.results.measures import along, force, markers, motion, stress
-from turgor.results.measures.registry import MEASURES, Choice, Measure, available, check, check_kinds, evaluate, tables
+from turgor.results.measures.registry import (
+    MEASURES,
+    Choice,
+    Measure,
+    available,
+    check,
+    check_kinds,
+    evaluate,
+    silent,
+    tables,
+)
 
 __all__ = [
     "MEASURES",
@@ -19,6 +29,7 @@ __all__ = [
     "force",
     "markers",
     "motion",
+    "silent",
     "stress",
     "tables",
 ]

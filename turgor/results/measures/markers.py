@@ -37,6 +37,9 @@ def _file(value: object, info: ValidationInfo) -> Path:
 Places = Annotated[tuple[Place, ...], Field(min_length=1)]
 DataFile = Annotated[Path, BeforeValidator(_file)]
 
+MOST_LISTED = 8
+"""Measured pressures that are told one by one."""
+
 
 @measure(*(f"displacement_{{name}}_{axis}_mm" for axis in "xyz"))
 def displacement(state: StoredState, *, at: Place, name: Name | None = None) -> FloatArray:
@@ -45,7 +48,15 @@ def displacement(state: StoredState, *, at: Place, name: Name | None = None) -> 
     return in_space(np.asarray(_shares(state.mesh, (at,)) @ state.displacement)[0])
 
 
-@measure("marker_rmse_{name}_percent", surfaces=(MOUNT, TIP_FACE))
+def _measured_states(*, file: Path, **others: object) -> str:
+    del others
+    pressures = [from_internal(value, "pressure", "kPa") for value in _table(file, file.stat().st_mtime_ns).pressures]
+    few = ", ".join(f"{pressure:.4g}" for pressure in pressures)
+    listed = few if len(pressures) <= MOST_LISTED else f"{pressures[0]:.4g} to {pressures[-1]:.4g}"
+    return f"'{file.name}' has what was measured at {listed} kPa, and solver.outputs asks for states"
+
+
+@measure("marker_rmse_{name}_percent", surfaces=(MOUNT, TIP_FACE), states=_measured_states)
 def marker_rmse(
     state: StoredState, *, file: DataFile, at: Places, length: PositiveLength | None = None, name: Name | None = None
 ) -> float:

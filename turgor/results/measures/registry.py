@@ -53,6 +53,8 @@ class Measure:
         Whether a run has it that does not say which measures it wants.
     is_curve
         Whether it gives a table instead of numbers.
+    states
+        Of a measure that has numbers in some states only: says, by its parameters, in which.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Measure:
     parameters: type[BaseModel]
     by_default: bool
     is_curve: bool
+    states: Callable[..., str] | None = None
 
     def missing(self, body: Body) -> list[str]:
         """Return what the measure needs and the body lacks."""
@@ -159,11 +162,12 @@ def measure(
     markers: tuple[str, ...] = (),
     models: tuple[ModelKind, ...] = ANYWHERE,
     by_default: bool = False,
+    states: Callable[..., str] | None = None,
 ) -> Callable[[Function], Function]:
-    """Register the decorated function as the measure of its own name."""
+    """Register the decorated function as the measure of its own name; `states` as of :class:`Measure`."""
 
     def register(function: Function) -> Function:
-        _register(function, keys, surfaces, markers, models, by_default=by_default, is_curve=False)
+        _register(function, keys, surfaces, markers, models, by_default=by_default, is_curve=False, states=states)
         return function
 
     return register
@@ -245,6 +249,17 @@ def evaluate(choices: Iterable[Choice | str], state: StoredState) -> dict[str, f
     return values
 
 
+def silent(choices: Iterable[Choice], history: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say which of the measures that have numbers in some states only have none in a whole `history`, and why."""
+    return [
+        f"measures.{choice.entry.name}: {key} is empty in every step; {choice.entry.states(**dict(choice.parameters))}"
+        for choice in choices
+        if choice.entry.states is not None
+        for key in choice.keys
+        if all(row.get(key) is None for row in history)
+    ]
+
+
 def tables(choices: Iterable[Choice], state: StoredState) -> dict[str, list[dict[str, float]]]:
     """Return the tables of the curves among the measures: title → rows, column → value."""
     return {
@@ -263,6 +278,7 @@ def _register(
     *,
     by_default: bool,
     is_curve: bool,
+    states: Callable[..., str] | None = None,
 ) -> None:
     name = function.__name__
     hints = get_type_hints(function, include_extras=True)
@@ -273,7 +289,7 @@ def _register(
     }
     config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     parameters = create_model(name, __config__=config, **fields)
-    MEASURES[name] = Measure(name, keys, surfaces, markers, models, function, parameters, by_default, is_curve)
+    MEASURES[name] = Measure(name, keys, surfaces, markers, models, function, parameters, by_default, is_curve, states)
 
 
 def _check_kind(entry: Measure, kind: ModelKind) -> None:
