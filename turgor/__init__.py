@@ -28,9 +28,11 @@ if TYPE_CHECKING:
     from turgor.materials.library import library
     from turgor.materials.registry import create as material
     from turgor.materials.registry import models
+    from turgor.mesh.files import check_name as check_mesh_name
     from turgor.mesh.files import read as read_mesh
     from turgor.mesh.files import write as write_mesh
     from turgor.mesh.mesh import Mesh
+    from turgor.mesh.picture import check_png
     from turgor.mesh.picture import save_picture as draw_mesh
     from turgor.mesh.quality import quality as mesh_quality
     from turgor.mesh.walls import walls as mesh_walls
@@ -78,6 +80,8 @@ __all__ = [
     "StlFile",
     "TurgorError",
     "assess",
+    "check_mesh_name",
+    "check_png",
     "check_targets",
     "draw_mesh",
     "environment",
@@ -112,9 +116,9 @@ _HOMES = {
     "turgor.materials.fit": ("fit",),
     "turgor.materials.library": ("find_material", "library"),
     "turgor.materials.registry": ("material", "models"),
-    "turgor.mesh.files": ("read_mesh", "write_mesh"),
+    "turgor.mesh.files": ("check_mesh_name", "read_mesh", "write_mesh"),
     "turgor.mesh.mesh": ("Mesh",),
-    "turgor.mesh.picture": ("draw_mesh",),
+    "turgor.mesh.picture": ("check_png", "draw_mesh"),
     "turgor.mesh.quality": ("mesh_quality",),
     "turgor.mesh.walls": ("mesh_walls",),
     "turgor.results.files": ("check_targets",),
@@ -143,6 +147,7 @@ _HOMES = {
 """Module → the public names that it defines."""
 
 _RENAMED = {
+    "check_mesh_name": "check_name",
     "draw_mesh": "save_picture",
     "find_material": "find",
     "material": "create",

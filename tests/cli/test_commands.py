@@ -285,6 +285,37 @@ def test_mesh_writes_the_mesh_it_describes(tmp_path: Path) -> None:
     assert turgor("mesh", SMALL, "--out", tmp_path / "tube.stl").exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mesh", SMALL, "--out", "x.foo"], "x.foo: this kind of mesh file is not known (found '.foo')"),
+        (["mesh", SMALL, "--out", "none/x.vtu"], "none/x.vtu: there is no such folder"),
+        (["mesh", SMALL, "--out", "."], ".: this is a folder; expected the name of a file"),
+        (["mesh", SMALL, "--out", "a.vtu", "--picture", "b.jpg"], "b.jpg: a picture is saved as .png"),
+        (["mesh", SMALL, "--picture", "b.png", "--quality-picture", "b.png"], "b.png: two things are to be written"),
+        (["export", SMALL, "--out", "x.foo"], "x.foo: models of this kind are not written"),
+        (["export", SMALL, "--out", "none/x.inp"], "none/x.inp: there is no such folder"),
+        (["fit", GOOD_TEST, "--out", "none/x.yaml"], "none/x.yaml: there is no such folder"),
+        (["fit", GOOD_TEST, "--report", "file"], "file: the folder cannot be made here: this is a file"),
+        (["run", SMALL, "--out", "file"], "file: the folder cannot be made here: this is a file"),
+        (["templates", "tube", "--preview", "--out", "none/x.png"], "none/x.png: there is no such folder"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is_computed(
+    arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def computed(*_: object, **__: object) -> None:
+        raise AssertionError("too late")
+
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    for place in ("mesh.preview.generate", "study.meshing.generate", "materials.fit.solve"):
+        monkeypatch.setattr(f"turgor.{place}", computed)
+    refused = turgor(*arguments)
+    assert (refused.exit_code, refused.stderr.startswith(f"turgor: {words}")) == (2, True), refused.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
 def test_the_schema_is_one_of_case_files() -> None:
     assert set(printed("schema")["properties"]) == set(tg.Case.model_fields)
 

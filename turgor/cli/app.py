@@ -115,8 +115,9 @@ def fit(
     as_json: AsJson = False,
 ) -> None:
     """Fit material models to tensile and other tests."""
-    written = tg.fit_report_files(report) if report else ()
-    tg.check_targets([out, *written], [*data, *(models or ())])
+    read = [*data, *(models or ())]
+    tg.check_targets([out], read)  # whose folder, other than that of the report, is not made
+    tg.check_targets([out, *(tg.fit_report_files(report) if report else ())], read, makes_folder=True)
     tests = tg.read_tests(
         data,
         mode=mode,
@@ -189,6 +190,7 @@ def templates(
         if not name:
             raise tg.InputError("a picture is one of a single template", expected="its name before --preview")
         path = out or Path(f"{name}.png")
+        tg.check_targets([path], [])
         tg.preview(name, path, changes or ())
         if as_json:
             print_json({"template": name, "picture": str(path)})
@@ -225,6 +227,9 @@ def mesh(
         case = tg.load_draft(case_file, changes or ())
         path = out or Path(f"{case.name}.vtu")
         tg.check_targets([path, picture, quality_picture], [case_file, *case.files_read])
+        tg.check_mesh_name(path)
+        for image in filter(None, (picture, quality_picture)):
+            tg.check_png(image)
         meshed = tg.mesh_case(case, picture)
     tg.write_mesh(meshed, path)
     if quality_picture:

@@ -57,6 +57,11 @@ def meshio_name(cells: IntArray) -> str:
     return _TYPES[cells.shape[1]][0]
 
 
+def check_name(path: str | Path) -> None:
+    """Raise InputError if a path does not end as the files do that :func:`write` writes."""
+    _check_suffix(Path(path), ".vtk", "straight cells only")
+
+
 def write(mesh: Mesh, path: str | Path) -> None:
     """Write a mesh with its names to a .msh (gmsh 2.2, binary) or .vtu file, or its regions to a .vtk one.
 
@@ -69,7 +74,7 @@ def write(mesh: Mesh, path: str | Path) -> None:
         If the suffix is another one or the file cannot be written.
     """
     path = Path(path)
-    _check_suffix(path, ".vtk", "straight cells only")
+    check_name(path)
     writer = None if path.suffix == ".vtk" else _FORMATS[path.suffix][0]
     with writing(path, "the mesh cannot be written"):
         if writer:

@@ -182,7 +182,7 @@ def colour_of(name: str) -> str | None:
 def check_png(path: str | Path) -> None:
     """Raise InputError if a path does not end in .png."""
     if Path(path).suffix != ".png":
-        raise InputError("a picture is saved as .png", value=str(path), expected="a name that ends in .png")
+        raise InputError("a picture is saved as .png", file=path, expected="a name that ends in .png")
 
 
 @contextlib.contextmanager

@@ -106,8 +106,10 @@ def is_same_file(copy: Path, path: Path) -> bool:
     return copy.exists() and path.exists() and copy.samefile(path)
 
 
-def check_targets(targets: Iterable[str | Path | None], read: Iterable[str | Path]) -> None:
-    """Refuse to write where a file lies that is read; to be called before anything is computed.
+def check_targets(
+    targets: Iterable[str | Path | None], read: Iterable[str | Path], *, makes_folder: bool = False
+) -> None:
+    """Refuse targets that cannot be written, or lie where a file is read; to be called before anything is computed.
 
     Parameters
     ----------
@@ -115,17 +117,51 @@ def check_targets(targets: Iterable[str | Path | None], read: Iterable[str | Pat
         The files to be written; ``None`` stands for one that nobody asked for.
     read
         The files that are read: the case, its data, tests.
+    makes_folder
+        Whether the folder of a target is made where it is missing.
 
     Raises
     ------
     InputError
-        If a target is one of the files that are read, under whatever name.
+        If a target is one of the files that are read, under whatever name, is a folder, lies in none, may not be
+        written, or stands twice.
     """
     sources = [Path(path) for path in read]
+    seen: set[Path] = set()
     for target in (Path(path) for path in targets if path is not None):
         if any(is_same_file(target, source) for source in sources):
             problem = "this file is read here, and what is to be written would replace it"
             raise InputError(problem, file=target, expected="another name for what is written")
+        with writing(target):
+            if target.is_dir():
+                raise InputError("this is a folder", file=target, expected="the name of a file")
+            if target.exists():
+                if not os.access(target, os.W_OK):
+                    raise UnwritableError("the file cannot be written: there is no right to", file=target)
+            elif makes_folder or target.parent.is_dir():
+                check_folder(target.parent)
+            else:
+                raise InputError("there is no such folder", file=target, value=str(target.parent))
+            if target.resolve() in seen:
+                raise InputError("two things are to be written into this file", file=target, expected="a name for each")
+            seen.add(target.resolve())
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be made, or written into; nothing is made there yet.
+
+    Raises
+    ------
+    InputError
+        If it is a file or in one, or may not be written.
+    """
+    with writing(folder, "the folder cannot be made"):
+        there = next(path for path in (folder, *folder.parents) if path.exists())
+        if not there.is_dir():
+            raise InputError("the folder cannot be made here: this is a file", file=there, expected="another folder")
+        if not os.access(there, os.W_OK | os.X_OK):
+            problem = "the folder cannot be written: there is no right to"
+            raise UnwritableError(problem, file=there, expected="another folder")
 
 
 class FolderLock:

@@ -19,7 +19,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -30,7 +29,7 @@ from xml.sax.saxutils import quoteattr
 import yaml
 
 from turgor.common.errors import InputError
-from turgor.common.writing import UnwritableError, writing
+from turgor.common.writing import writing
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.results import measures as known_measures
@@ -49,6 +48,7 @@ from turgor.results.files import (
     LOCK,
     PARTIAL,
     FolderLock,
+    check_folder,
     is_same_file,
     json_text,
     read_json,
@@ -405,14 +405,7 @@ def check_place(folder: Path, files: Mapping[Path, str]) -> None:
     InputError
         If it is a file or in one, may not be written, or holds files with the names of a run's that no run has written.
     """
-    with writing(folder, "the folder cannot be made"):
-        there = next(path for path in (folder, *folder.parents) if path.exists())
-        if not there.is_dir():
-            problem = "the folder of a run cannot be made here: this is a file"
-            raise InputError(problem, file=there, expected="a folder (--out)")
-        if not os.access(there, os.W_OK | os.X_OK):
-            problem = "the folder of a run cannot be written: there is no right to"
-            raise UnwritableError(problem, file=there, expected="another folder (--out)")
+    check_folder(folder)
     if not _is_run(folder):
         _check_foreign(folder, files)
 

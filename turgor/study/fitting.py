@@ -61,7 +61,7 @@ def write_fit_report(report: FitReport, folder: str | Path) -> Path:
     InputError
         If the folder cannot be written, or a test lies where a file is to be written.
     """
-    check_targets(fit_report_files(folder), _files(report))
+    check_targets(fit_report_files(folder), _files(report), makes_folder=True)
     document = fit_document(report)
     place = Path(folder)
     with writing(place, "the report cannot be written"):
