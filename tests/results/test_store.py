@@ -222,7 +222,9 @@ def test_kill_9_loses_no_finished_step(tmp_path: Path, wait: int, small_finger: 
         store.append(bent_record(small_finger, store.n_steps, 1.0))
 
 
-@pytest.mark.parametrize("name", ["case.yaml", "fit.json", "curves/force.csv", "data/force.csv"])
+@pytest.mark.parametrize(
+    "name", ["case.yaml", "fit.json", "report.html", "run.log", "curves/force.csv", "data/force.csv"]
+)
 def test_what_no_run_has_written_is_not_replaced(tmp_path: Path, small_finger: Mesh, name: str) -> None:
     measured = tmp_path / "force.csv"
     measured.write_text("measured", encoding="utf-8")
@@ -236,6 +238,14 @@ def test_what_no_run_has_written_is_not_replaced(tmp_path: Path, small_finger: M
     own.unlink()
     RunStore.create(folder, small_finger, {}, overwrite=True).close()
     RunStore.create(folder, small_finger, {}, overwrite=True).close()
+
+
+def test_a_run_that_replaces_another_leaves_nothing_of_it(tmp_path: Path, small_finger: Mesh) -> None:
+    folder = started_run(tmp_path / "run", small_finger, 1)
+    for name in ("report.html", "run.log"):
+        (folder / name).write_text("of the run before", encoding="utf-8")
+    RunStore.create(folder, small_finger, CASE, overwrite=True).close()
+    assert not {"report.html", "run.log"} & {path.name for path in folder.iterdir()}
 
 
 def test_two_runs_cannot_write_one_folder(tmp_path: Path, small_finger: Mesh) -> None:

@@ -158,7 +158,7 @@ def check_folder(folder: Path) -> None:
     with writing(folder, "the folder cannot be made"):
         there = next(path for path in (folder, *folder.parents) if path.exists())
         if not there.is_dir():
-            raise InputError("the folder cannot be made here: this is a file", file=there, expected="another folder")
+            raise InputError("the folder cannot be made here: this is a file", file=there, expected="a folder")
         if not os.access(there, os.W_OK | os.X_OK):
             problem = "the folder cannot be written: there is no right to"
             raise UnwritableError(problem, file=there, expected="another folder")

@@ -24,10 +24,8 @@ from turgor.results.files import write_text
 from turgor.results.measures import evaluate
 from turgor.results.pictures import draw
 from turgor.results.record import StepRecord
-from turgor.results.store import RunStore
+from turgor.results.store import REPORT, RunStore
 from turgor.results.stored import Body
-
-FILE_NAME = "report.html"
 
 _N_PICTURES = 5
 _N_MODES = 2
@@ -95,7 +93,7 @@ def report(folder: str | Path) -> Path:
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters["number"] = number
-    path = store.folder / FILE_NAME
+    path = store.folder / REPORT
     write_text(path, environment.get_template("report.html").render(**content))
     return path
 

@@ -70,7 +70,8 @@ _OF_LOAD = ("step", "fraction", "time_s", "pressure_kPa")
 
 _STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
 _PVD, _HISTORY, _SUMMARY, _FIT, _CURVES = "result.pvd", "history.csv", "summary.json", "fit.json", "curves"
-_FILES = (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT)
+REPORT, RUN_LOG = "report.html", "run.log"
+_FILES = (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT, REPORT, RUN_LOG)
 _PATTERNS = (f"{_STEPS}/*.npz", f"{_STEPS}/*.vtu", f"{_STEPS}/*{PARTIAL}", f"{_CURVES}/*.csv")
 """What a run writes, the one that makes the folder a run's folder first."""
 

@@ -24,7 +24,7 @@ from turgor.results.archive import Row
 from turgor.results.measures import check_kinds, silent
 from turgor.results.record import StepRecord
 from turgor.results.report import report
-from turgor.results.store import RunStore, check_place
+from turgor.results.store import RUN_LOG, RunStore, check_place
 from turgor.results.stored import kind_of
 from turgor.results.summary import Summary, summarise
 from turgor.solver.control import ATMOSPHERE
@@ -150,7 +150,7 @@ class _Running:
                 if not kept:
                     # Not before the case is known to be right: what is wrong with it is to be told alone.
                     self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
-                self.run_log.write_to(self.folder / "run.log", append=continues)
+                self.run_log.write_to(self.folder / RUN_LOG, append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
                 spent = store.spent
                 if fit:
