@@ -353,6 +353,17 @@ def test_export_refuses_what_the_program_lacks(tmp_path: Path) -> None:
     assert not (tmp_path / "tube.inp").exists()
 
 
+def test_export_refuses_and_doubts_what_a_run_does(tmp_path: Path) -> None:
+    place = ("--out", tmp_path / "tube.inp")
+    refused = turgor("export", SMALL, *place, "--set", "materials.body.constants.C10=1 Pa")
+    assert (refused.exit_code, place[1].exists()) == (2, False)
+    assert "loads.0.value: this is" in refused.stderr
+    assert "times the shear modulus" in refused.stderr
+    doubted = turgor("export", SMALL, *place, "--set", "loads.0.value=3 mPa")
+    assert doubted.exit_code == 0
+    assert "loads.0: a pressure of 0.003 Pa moves nothing" in doubted.stderr
+
+
 MESHED = """\
 geometry: {template: mesh, file: FILE}
 materials: {body: {model: neo-hookean, constants: {C10: 0.05 MPa}}}

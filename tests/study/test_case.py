@@ -14,7 +14,7 @@ from turgor.common.units import to_internal
 from turgor.geometry import cad
 from turgor.geometry.tube import CappedTube
 from turgor.materials import create
-from turgor.study.build import check_sizes
+from turgor.study.build import check_sizes, doubts
 from turgor.study.case import Case, load_case
 from turgor.study.datafiles import data_names
 from turgor.study.materials import build_materials
@@ -22,6 +22,7 @@ from turgor.study.meshing import mesh_case
 from turgor.study.setup import Setup
 from turgor.study.validation import suggestion
 
+PLAIN = "materials.body={model: neo-hookean, constants: {C10: 50 kPa}, density: 1 g/cm^3}"
 HELD = [{"type": "clamped", "surface": "mount"}]
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 
@@ -152,6 +153,23 @@ def test_what_is_doubtful_in_tests_is_told(small_tube: Path, caplog: pytest.LogC
     crosshead, unit = caplog.messages
     assert "pull.csv: the strain comes from the crosshead" in crosshead
     assert "pull.csv: the stress is up to 7e+04 MPa at strains up to 0.7: stiffer than elastomers are" in unit
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("loads.0.value=20 mPa", "loads.0: a pressure of 0.02 Pa moves nothing"),
+        ("materials.body.density=1070 g/cm^3", "materials.body.density: 1.07e+06 kg/m³ is heavier than any element"),
+        ("materials.body.density=1 g/m^3", "materials.body.density: 0.001 kg/m³ is lighter than foams"),
+        ("materials.body.poisson=-0.9", "no elastomer has a negative one"),
+    ],
+)
+def test_slips_of_a_unit_that_leave_a_run_possible_are_doubted(small_tube: Path, change: str, words: str) -> None:
+    case = load_case(small_tube, [PLAIN])
+    assert doubts(case, build_materials(case.materials)[0]) == []
+    case = load_case(small_tube, [PLAIN, change])
+    (doubt,) = doubts(case, build_materials(case.materials)[0])
+    assert words in doubt
 
 
 def test_the_library_material_can_be_given_a_density(small_tube: Path) -> None:

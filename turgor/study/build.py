@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 
 from turgor.common.errors import InputError
-from turgor.common.units import to_text
+from turgor.common.units import from_internal, to_text
 from turgor.fem.section import section_of
 from turgor.fem.system import System
 from turgor.materials import Hyperelastic
@@ -21,6 +21,12 @@ STIFFEST_SOLID = 5.5e5
 
 MOST_PRESSURE_PER_MODULUS = 100.0
 """Pressure over shear modulus beyond which no actuator of any shape is an equilibrium worth asking for."""
+
+LEAST_PRESSURE_PER_MODULUS = 1e-6
+"""Pressure over the shear modulus of the softest material below which no actuator moves visibly."""
+
+USUAL_DENSITY = (1e-11, 2.3e-8)
+"""From the lightest foam to osmium, t/mm³."""
 
 MOST_ELEMENTS_PER_WALL = 20
 """Beyond it the mesh is not a fine one but a slip of the unit, and would fill the memory of any machine."""
@@ -102,18 +108,45 @@ def _check_size(value: float, stiffest: float, key: str) -> None:
 
 
 def doubts(case: Case, materials: Mapping[str, Hyperelastic]) -> list[str]:
-    """Say what is to be known of the materials before a run goes where they cannot be trusted.
+    """Say what is to be known of materials and loads before a run: slips of a unit, and where no trust is due.
 
-    The softest is examined up to the case's largest stretch; a stiffer one, which strains less, up to a strain that is
-    smaller in the ratio of the shear moduli.
+    The softest material is examined up to the case's largest stretch; a stiffer one, which strains less, up to a strain
+    that is smaller in the ratio of the shear moduli.
     """
     softest = min(material.shear_modulus for material in materials.values())
-    found = []
+    found = list(_doubtful_pressures(case, softest))
     for region, material in materials.items():
+        found += [f"materials.{region}{text}" for text in _doubtful_sizes(material)]
         stretch = 1.0 + (case.largest_stretch - 1.0) * softest / material.shear_modulus
         if stretch >= LEAST_STRETCH:
             found += [f"materials.{region}: {text}" for text in warnings_in_use(material, stretch)]
     return found
+
+
+def _doubtful_pressures(case: Case, softest: float) -> Iterator[str]:
+    """Say where a pressure is so small beside the `softest` shear modulus, MPa, that it is likely to be another one."""
+    for number, load in enumerate(case.loads):
+        largest = max(map(abs, load.pressures), default=0.0) if isinstance(load, PressureCase) else 0.0
+        if 0.0 < largest < LEAST_PRESSURE_PER_MODULUS * softest:
+            yield (
+                f"loads.{number}: a pressure of {from_internal(largest, 'pressure', 'Pa'):.3g} Pa moves nothing: it is "
+                f"{largest / softest:.2g} times the shear modulus of the softest material; check both units "
+                "(mPa is a thousandth of a Pa)"
+            )
+
+
+def _doubtful_sizes(material: Hyperelastic) -> Iterator[str]:
+    """Say which constants that every material has are not those of a solid, each with its key."""
+    if material.poisson_ratio < 0.0:
+        yield (
+            f": a bulk modulus of {material.bulk_modulus:.3g} MPa beside a shear modulus of "
+            f"{material.shear_modulus:.3g} MPa makes Poisson's ratio {material.poisson_ratio:.3g}, and no elastomer "
+            "has a negative one; check both units"
+        )
+    low, high = USUAL_DENSITY
+    if material.density is not None and not low <= material.density <= high:
+        kind = "lighter than foams" if material.density < low else "heavier than any element"
+        yield f".density: {from_internal(material.density, 'density', 'kg/m^3'):.3g} kg/m³ is {kind}; check the unit"
 
 
 def every_region(materials: Mapping[str, Hyperelastic], mesh: Mesh) -> dict[str, Hyperelastic]:

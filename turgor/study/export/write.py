@@ -6,14 +6,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from turgor.common.errors import InputError
+from turgor.common.log import logger
 from turgor.common.writing import writing
 from turgor.mesh import Mesh
 from turgor.results.files import check_targets
+from turgor.study.build import check_sizes, doubts
 from turgor.study.case import Case
 from turgor.study.export import calculix, febio
 from turgor.study.export.problem import Problem, problem_of
 from turgor.study.materials import build_materials
 from turgor.study.meshing import checked_mesh
+
+log = logger("study")
 
 _Writer = Callable[[Problem], Iterator[str]]
 _PROGRAMS: dict[str, tuple[str, _Writer]] = {
@@ -50,6 +54,9 @@ def export_case(case: Case, path: str | Path) -> Mesh:
     check_targets([path], case.files_read)
     program, writer = _PROGRAMS[path.suffix]
     materials, _ = build_materials(case.materials)
+    check_sizes(case, materials)
+    for text in doubts(case, materials):
+        log.warning(text)
     mesh = checked_mesh(case)
     lines = list(writer(problem_of(case, mesh, materials, program)))
     with writing(path, "the model cannot be written"):
