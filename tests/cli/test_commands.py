@@ -210,6 +210,14 @@ def test_a_material_of_a_model_of_ones_own_fits_into_a_case_anywhere(tmp_path: P
     assert "materials.body: CalculiX has no such material (found 'mine')" in result.stderr
 
 
+def test_a_file_of_tests_counts_once(tmp_path: Path) -> None:
+    refused = turgor("fit", GOOD_TEST, GOOD_TEST.parent / "." / GOOD_TEST.name, "--model", "yeoh-1")
+    assert (refused.exit_code, "good.csv: this file of tests is given twice" in refused.stderr) == (2, True)
+    twice = f"materials.body={{fit: ['{GOOD_TEST}', '{GOOD_TEST}'], models: [yeoh-1]}}"
+    refused = turgor("run", SMALL, "--set", twice, "--out", tmp_path / "run")
+    assert (refused.exit_code, "good.csv: this file of tests is given twice" in refused.stderr) == (2, True)
+
+
 def test_a_fit_is_told_what_its_file_does_not_say() -> None:
     plain = printed("fit", GOOD_TEST, "--model", "yeoh-1", "--json")
     told = turgor("fit", GOOD_TEST, "--model", "yeoh-1", "--strain-source", "crosshead", "--json")

@@ -17,7 +17,7 @@ from turgor.materials.fit import fit, parse_strain_range
 from turgor.materials.fit_result import FitReport
 from turgor.materials.library import find
 from turgor.materials.registry import is_model_file
-from turgor.study.specimen import SpecimenCase
+from turgor.study.specimen import SpecimenCase, check_once
 from turgor.study.validation import StrictModel, collected, invalid, under
 
 log = logger("study")
@@ -173,7 +173,8 @@ class FittedMaterial(_Compressible):
     specimen: SpecimenCase = Field(default=SpecimenCase(), description="what the files do not say")
 
     def fitted(self) -> FitReport:
-        """Return the fit; raise InputError as :func:`turgor.materials.fit.fit` does."""
+        """Return the fit; raise InputError as :func:`turgor.materials.fit.fit` does, or if a file stands twice."""
+        check_once(self.fit)
         return fit(
             [test for file in self.fit for test in self.specimen.read(file)],
             self.models,

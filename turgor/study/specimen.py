@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from turgor.common.errors import InputError
 from turgor.common.units import PositiveArea, PositiveLength, PositivePressure
 from turgor.materials.measurement import MaterialTest, Specimen
 from turgor.materials.testdata import read_tests as read_file
@@ -54,6 +55,21 @@ class SpecimenCase(StrictModel):
         return test if self.known_modulus is None else test.with_known_modulus(self.known_modulus)
 
 
+def check_once(files: Sequence[str | Path]) -> None:
+    """Refuse a file of tests that stands twice: it would count double, and make the intervals narrower than they are.
+
+    Raises
+    ------
+    InputError
+        Naming the file.
+    """
+    places = [Path(file).resolve() for file in files]
+    for number, place in enumerate(places):
+        if place in places[:number]:
+            expected = "each file once (its weight makes it count more)"
+            raise InputError("this file of tests is given twice", file=files[number], expected=expected)
+
+
 def read_tests(data: str | Path | Sequence[str | Path], **specimen: Any) -> list[MaterialTest]:
     """Return the tests of one or several files, for :func:`turgor.fit`.
 
@@ -68,12 +84,13 @@ def read_tests(data: str | Path | Sequence[str | Path], **specimen: Any) -> list
     Raises
     ------
     InputError
-        If a file cannot be read, or an argument is wrong.
+        If a file cannot be read or is given twice, or an argument is wrong.
     """
     said = {key: value for key, value in specimen.items() if value is not None}
     try:
         case = SpecimenCase.model_validate(said)
     except ValidationError as error:
         raise explain(error, said, SpecimenCase) from None
-    files = [data] if isinstance(data, (str, Path)) else data
+    files = [data] if isinstance(data, (str, Path)) else list(data)
+    check_once(files)
     return [test for file in files for test in case.read(file)]
