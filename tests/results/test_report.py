@@ -154,6 +154,16 @@ def test_the_fit_has_its_own_section(folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("without_pictures")
+def test_what_a_run_warned_of_stands_before_its_results(folder: Path) -> None:
+    assert "Warnings" not in Page(report(folder).read_text(encoding="utf-8")).words
+    with RunStore.resume(folder) as store:
+        store.warn(["materials.body: unstable where λ > 2", "the unit"])
+        store.warn(["the unit"])
+    words = Page(report(folder).read_text(encoding="utf-8")).words
+    assert "Warnings materials.body: unstable where λ > 2 the unit Pressure" in words
+
+
+@pytest.mark.usefixtures("without_pictures")
 def test_the_report_of_a_half_says_so(tmp_path: Path, folder: Path) -> None:
     half = hollow_finger((6, 4, 3), half=True)
     with RunStore.create(tmp_path / "half", half, CASE) as store:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from turgor.results.files import replacing
 from turgor.results.store import RunStore
 from turgor.study.case import load_case
 from turgor.study.run import Run, run
+from turgor.study.states import Recorder
 
 
 class Watch:
@@ -242,6 +244,45 @@ def test_an_unstable_material_is_told_of_before_the_mesh(small_tube: Path, tmp_p
     watch = Watch()
     run(load_case(small_tube, ["solver.steps=1"]), tmp_path / "3", progress=watch)
     assert watch.warnings == []
+
+
+@pytest.mark.usefixtures("unreported")
+def test_warnings_stay_with_the_run_and_are_not_doubled_where_it_goes_on(
+    small_tube: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded = Recorder.record
+    overlap = {"contact": {"self": {"surfaces_intersect": True}}}
+    monkeypatch.setattr(
+        Recorder,
+        "record",
+        lambda *told: replace(recorded(*told), cavity_volumes={"cavity": -1.0}, standing=overlap),
+    )
+    folder, case = tmp_path / "run", load_case(small_tube, ["materials.body={library: tpu-0deg-mooney-rivlin-5}"])
+    watch = Watch(interrupt_after=2)
+    with pytest.raises(KeyboardInterrupt):
+        run(case, folder, progress=watch)
+    told = RunStore.open(folder).warnings
+    assert told == watch.warnings[:-1]  # the last one is the interrupt itself
+    assert len(told) == 5
+    assert "the material is unstable" in told[1]
+    assert "cavity encloses less than nothing at step 0" in told[3]
+    assert told[4] == "contact 'self': the surfaces are seen to overlap by more than 1 % of the wall at step 0"
+    done = run(case, folder, resume=True)
+    assert done.summary["warnings"] == RunStore.open(folder).warnings == told
+    assert run(case, folder, resume=True).summary["warnings"] == told
+    monkeypatch.undo()
+    monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
+    clean = run(load_case(small_tube), folder, overwrite=True)
+    assert "warnings" not in clean.summary
+    assert RunStore.open(folder).warnings == []
+
+
+@pytest.mark.usefixtures("unreported")
+def test_what_ends_a_run_is_its_reason_and_no_warning(small_tube: Path, tmp_path: Path) -> None:
+    changes = ["loads.0.value=500 kPa", "solver.steps=20", "solver.smallest_step=0.02"]
+    stopped = run(load_case(small_tube, changes), tmp_path / "run")
+    (event,) = stopped.summary["warnings"]
+    assert event.startswith("limit-pressure at ")
 
 
 @pytest.mark.usefixtures("unreported")

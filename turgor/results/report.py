@@ -81,6 +81,7 @@ def report(folder: str | Path) -> Path:
     content: dict[str, Any] = {
         "title": _title(store),
         "summary": store.summary,
+        "warnings": store.warnings,
         "case": store.case_text,
         "plotly_js": get_plotlyjs(),
         "fit": _fit_section(store.fit),

@@ -13,6 +13,7 @@
 ``curves/NAME.csv``    a measure that is a curve: its rows of all steps
 ``summary.json``       what came out, once the run has ended
 ``fit.json``           the fit of the material, if the run made one
+``warnings.json``      what the run warned of, if it did
 =====================  ==============================================================================================
 """
 
@@ -70,8 +71,9 @@ _OF_LOAD = ("step", "fraction", "time_s", "pressure_kPa")
 
 _STORE, _CASE, _MESH, _STEPS = "store.json", "case.yaml", "mesh.npz", "steps"
 _PVD, _HISTORY, _SUMMARY, _FIT, _CURVES = "result.pvd", "history.csv", "summary.json", "fit.json", "curves"
+_WARNINGS = "warnings.json"
 REPORT, RUN_LOG = "report.html", "run.log"
-_FILES = (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT, REPORT, RUN_LOG)
+_FILES = (_STORE, _CASE, _MESH, _PVD, _HISTORY, _SUMMARY, _FIT, _WARNINGS, REPORT, RUN_LOG)
 _PATTERNS = (f"{_STEPS}/*.npz", f"{_STEPS}/*.vtu", f"{_STEPS}/*{PARTIAL}", f"{_CURVES}/*.csv")
 """What a run writes, the one that makes the folder a run's folder first."""
 
@@ -238,6 +240,14 @@ class RunStore:
         self._outdate()
         write_text(self.folder / _FIT, json_text(fit))
 
+    def warn(self, sentences: Iterable[str]) -> None:
+        """Keep what the run warns of, each sentence once: the parts of a resumed run warn of the same things."""
+        self._check_writable()
+        known = self.warnings
+        kept = list(dict.fromkeys([*known, *sentences]))
+        if len(kept) > len(known):
+            write_text(self.folder / _WARNINGS, json_text({"warnings": kept}))
+
     @property
     def mesh(self) -> Mesh:
         """The mesh of the run."""
@@ -293,6 +303,12 @@ class RunStore:
     def fit(self) -> dict[str, Any] | None:
         """The fit of the material, or None if the run has none."""
         return read_json(self.folder / _FIT) if (self.folder / _FIT).exists() else None
+
+    @property
+    def warnings(self) -> list[str]:
+        """The sentences of what the run warned of, also while it is on its way."""
+        path = self.folder / _WARNINGS
+        return [str(sentence) for sentence in read_json(path).get("warnings", ())] if path.exists() else []
 
     def load(self, index: int) -> StepRecord:
         """Read one step; raise InputError if there is none of that number or its file is damaged."""

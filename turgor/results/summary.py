@@ -41,6 +41,7 @@ def summarise(
     dofs: int,
     wall_s: float,
     peak_memory_mb: float,
+    warnings: Sequence[str] = (),
 ) -> Summary:
     """Return the summary of a run.
 
@@ -62,6 +63,8 @@ def summarise(
         Duration of the whole run in s, of all its parts where it was resumed.
     peak_memory_mb
         Largest resident memory in MB, of any part.
+    warnings
+        What the run warned of, in sentences.
     """
     final = {key: value for key, value in history[-1].items() if key not in _NOT_FINAL} if history else {}
     if all(key in final for key in _TIP):
@@ -82,6 +85,7 @@ def summarise(
         },
         "versions": versions(),
         **({"events": events} if (events := [_event(entry) for entry in history if entry.get("event")]) else {}),
+        **({"warnings": list(warnings)} if warnings else {}),
     }
 
 

@@ -14,7 +14,7 @@ from turgor.common.units import registry
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
 from turgor.results.history import row
-from turgor.results.measures import Choice, check
+from turgor.results.measures import Choice, check, silent
 from turgor.results.record import StepRecord
 from turgor.results.report import report
 from turgor.results.store import RunStore
@@ -147,6 +147,11 @@ class Path:
         return bool(self.records) and self.records[-1].fraction == 1.0
 
     @property
+    def warnings(self) -> list[str]:
+        """What is to be known of these equilibria, in sentences: measures that are empty in all of them."""
+        return silent(self.measures, self.history)
+
+    @property
     def summary(self) -> Summary:
         """The numbers of the last step, the mesh and the solver, as in ``summary.json``."""
         return summarise(
@@ -158,6 +163,7 @@ class Path:
             dofs=self.dofs,
             wall_s=sum(record.solver["wall_s"] for record in self.records),
             peak_memory_mb=peak_memory_mb(),
+            warnings=self.warnings,
         )
 
     def report(self, folder: str | pathlib.Path, *, overwrite: bool = False) -> pathlib.Path:
@@ -182,6 +188,7 @@ class Path:
         ) as store:
             for record in self.records:
                 store.append(record)
+            store.warn(self.warnings)
             store.finish(self.summary)
         return report(place)
 

@@ -129,7 +129,6 @@ class _Running:
     def __init__(self, case: Case, folder: Path, files: dict[Path, str], show: Progress, run_log: RunLog) -> None:
         self.case, self.folder, self.files, self.show, self.run_log = case, folder, files, show, run_log
         self.begun = time.perf_counter()
-        self._doubted: set[str] = set()
         self._walked = False
 
     def run(self, *, continues: bool) -> Run:
@@ -152,14 +151,16 @@ class _Running:
                     self.show.tell("kernels are compiled for this machine first, which takes a minute or two, once")
                 self.run_log.write_to(self.folder / RUN_LOG, append=continues)
                 log.info("%d elements, %d unknowns", mesh.n_cells, system.n_dofs)
+                store.warn(self.run_log.warnings)
                 spent = store.spent
                 if fit:
                     store.write_fit(fit_document(fit))
                 stop = self._walk(system, course, store)
-                summary = self._summary(system, store, stop, spent)
-                store.finish(summary)
                 for text in silent(self.case.measures or (), store.history):
                     log.warning(text)
+                store.warn(self.run_log.warnings)
+                summary = self._summary(system, store, stop, spent)
+                store.finish(summary)
         self.show.stage("report")
         report(self.folder)
         return Run(self.folder, summary)
@@ -229,38 +230,44 @@ class _Running:
 
     def _keep(self, recorder: Recorder, store: RunStore, equilibrium: Equilibrium) -> None:
         record = recorder.record(equilibrium)
+        text = ", ".join(_load_text(name, value) for name, value in record.loads.items())
+        if equilibrium.event is not None:
+            log.warning("%s at %s", equilibrium.event, text)
+        self._doubt(record, store.warnings)
         try:
+            store.warn(self.run_log.warnings)  # before the step: a run that is cut short is not to go on without them
             store.append(record)
         except UnwritableError as error:
             kept = f"a folder with room; {store.n_steps} finished steps are kept, and --resume continues behind them"
             raise InputError(error.problem, file=error.file, expected=kept) from error
         recorder.begin()
-        text = ", ".join(_load_text(name, value) for name, value in record.loads.items())
         log.info("step %d: %s, %d iterations", record.index, text, equilibrium.iterations)
-        if equilibrium.event is not None:
-            log.warning("%s at %s", equilibrium.event, text)
-        self._doubt(record)
         self.show.advance(record.fraction, text)
 
-    def _doubt(self, record: StepRecord) -> None:
-        """Say, each once, where a state is an equilibrium but none of air in a cavity."""
+    def _doubt(self, record: StepRecord, told: Sequence[str]) -> None:
+        """Say where a state is an equilibrium but none of an actuator; what the run has `told` of a step not again."""
         doubts = {
-            "vacuum": (
+            "is deeper than a vacuum": (
                 f"{_load_text(name, value)} at step {record.index} is deeper than a vacuum: no cavity of air gets there"
                 for name, value in record.loads.items()
                 if name.startswith(PRESSURE_PREFIX) and value < -ATMOSPHERE
             ),
-            "volume": (
+            "encloses less than nothing": (
                 f"{name} encloses less than nothing at step {record.index}: its walls have passed through each other, "
                 "which contact: true would not let them"
                 for name, volume in record.cavity_volumes.items()
                 if volume < 0.0
             ),
+            "are seen to overlap": (
+                f"contact '{name}': the surfaces are seen to overlap by more than 1 % of the wall "
+                f"at step {record.index}"
+                for name, touch in record.standing.get("contact", {}).items()
+                if touch.get("surfaces_intersect")
+            ),
         }
-        for kind, texts in doubts.items():
+        for words, texts in doubts.items():
             text = next(texts, None)
-            if text is not None and kind not in self._doubted:
-                self._doubted.add(kind)
+            if text is not None and not any(words in sentence for sentence in told):
                 log.warning(text)
 
     def _tell(self, fraction: float, iteration: int, residual: float) -> None:
@@ -281,6 +288,7 @@ class _Running:
             dofs=system.n_dofs,
             wall_s=spent[0] + wall_s,
             peak_memory_mb=max(spent[1], peak_memory_mb()),
+            warnings=store.warnings,
         )
         last = store.last()
         return summary | dict(last.standing if last else {}) | ({"facts": stop.facts} if stop else {})

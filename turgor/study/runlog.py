@@ -24,11 +24,19 @@ class RunLog:
     ----------
     warn
         Told each warning, but for those of the solver on its way, whose results say what came of it.
+
+    Attributes
+    ----------
+    warnings
+        The same so far, for the run's folder, but for what ended the run, which its summary says.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
         self._logger = logging.getLogger(LOGGER_NAME)
         self._relay = Relay(warn, but=("solver",))
+        self.warnings: list[str] = []
+        self._kept = Relay(self.warnings.append, but=("solver",))
+        self._kept.addFilter(lambda record: record.levelno == logging.WARNING)
         self._memory = MemoryHandler(_CAPACITY, flushLevel=logging.CRITICAL + 1, flushOnClose=False)
         self._file: logging.FileHandler | None = None
 
@@ -37,6 +45,7 @@ class RunLog:
         self._logger.setLevel(logging.INFO)
         self._logger.addHandler(self._memory)
         self._logger.addHandler(self._relay)
+        self._logger.addHandler(self._kept)
         return self
 
     def write_to(self, path: Path, *, append: bool) -> None:
@@ -56,7 +65,7 @@ class RunLog:
         self._logger.addHandler(self._file)
 
     def __exit__(self, *failure: object) -> None:
-        for handler in (self._relay, self._memory, self._file):
+        for handler in (self._relay, self._kept, self._memory, self._file):
             if handler is not None:
                 self._logger.removeHandler(handler)
                 handler.close()
