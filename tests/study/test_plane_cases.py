@@ -77,6 +77,30 @@ def test_a_comparison_with_no_measured_state_is_told(tmp_path: Path) -> None:
     told = (done.folder / "run.log").read_text(encoding="utf-8")
     assert "measures.marker_rmse: marker_rmse_percent is empty in every step; 'tips.csv' has what was measured" in told
     assert "at 7, 20 kPa" in told
+    (warning,) = done.summary["warnings"]
+    assert warning in told
+
+
+def test_a_comparison_with_no_measured_state_is_told_in_python_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("turgor.study.path.report", lambda folder: folder)
+    table = tmp_path / "tips.csv"
+    table.write_text("pressure (kPa),marker,x (mm),y (mm),z (mm)\n7,1,0,40,0\n", encoding="utf-8")
+    tube = tg.CappedTube(inner_radius="6 mm", wall="3 mm", length="40 mm", cap="6 mm")
+    compared = {"marker_rmse": {"file": str(table), "at": [["0 mm", "0 mm", "40 mm"]]}}
+    rubber = tg.material("neo-hookean", {"C10": "0.05 MPa"}, poisson=0.499)
+    model = tg.Model(tube.mesh(size="6 mm"), body=rubber, measures=[compared])
+    path = model.inflate("4 kPa", steps=1)
+    (warning,) = path.warnings
+    assert "marker_rmse_percent is empty in every step; 'tips.csv' has what was measured at 7 kPa" in warning
+    assert [record.getMessage() for record in caplog.records if record.name == "turgor.study"] == [warning]
+    path.report(tmp_path / "run")
+    store = RunStore.open(tmp_path / "run")
+    assert store.summary is not None
+    assert store.summary["warnings"] == store.warnings == [warning]
+    measured = model.inflate("7 kPa", steps=1)
+    assert measured.warnings == []
 
 
 def tube_wall() -> Mesh:

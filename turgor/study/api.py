@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from turgor.common.errors import InputError
+from turgor.common.log import logger
 from turgor.common.units import to_internal
 from turgor.fem.loads import Pressure
 from turgor.fem.section import check_section, section_of
@@ -25,6 +26,8 @@ from turgor.study.course import LoadCourse, QuantityCourse, course_by
 from turgor.study.path import Path
 from turgor.study.setup import Setup, cavities_of
 from turgor.study.states import Recorder
+
+log = logger("study")
 
 
 class Model:
@@ -224,6 +227,8 @@ class Model:
                 on_step(path)
 
         course.walk(None, keep, None)
+        for text in path.warnings:
+            log.warning(text)
         return path
 
     def _description(self) -> dict[str, Any]:
