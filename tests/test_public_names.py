@@ -54,7 +54,7 @@ def test_import_loads_nothing_heavy_and_prints_nothing() -> None:
 
 
 def test_the_command_loads_nothing_heavy_for_its_help() -> None:
-    code = f"import sys, turgor.cli; print([name for name in {HEAVY!r} if name in sys.modules])"
+    code = f"import sys, turgor.cli.app; print([name for name in {HEAVY!r} if name in sys.modules])"
     assert in_a_new_process(code) == "[]\n"
 
 

@@ -11,7 +11,6 @@ heavy package. All that it does is to tell numba where the compiled kernels of t
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import pathlib
 from typing import TYPE_CHECKING, Any
 
@@ -160,7 +159,11 @@ _RENAMED = {
 
 
 def __getattr__(name: str) -> Any:
-    value = importlib.metadata.version("turgor") if name == "__version__" else _imported(name)
+    if name == "__version__":
+        # Not before it is asked for: it is most of what the import would take, and Ctrl-C is heeded only behind that.
+        value = importlib.import_module("importlib.metadata").version("turgor")
+    else:
+        value = _imported(name)
     globals()[name] = value  # the next access does not come here
     return value
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from turgor.cli import app
+from turgor.cli.app import app
 
 BAD = Path(__file__).parent / "bad"
 

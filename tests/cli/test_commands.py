@@ -16,7 +16,7 @@ import yaml
 from typer.testing import CliRunner, Result
 
 import turgor as tg
-from turgor.cli import app
+from turgor.cli.app import app
 from turgor.common.errors import MissingPackageError
 
 SMALL = Path(__file__).parents[1] / "study" / "small.yaml"

@@ -1,8 +1,21 @@
 """The ``turgor`` command: one thin typed command a study, on top of the public names of :mod:`turgor`."""
 
-from turgor.cli.app import app
+from __future__ import annotations
+
+import pkgutil
+import sys
+
+from turgor.cli.signals import exit_code_of, heed, heeding_signals
 
 
 def main() -> None:
     """Run the command line; the entry point of the ``turgor`` script."""
-    app(prog_name="turgor")
+    with heeding_signals():
+        try:
+            # By its name: what it imports takes a while, in which Ctrl-C is heeded already.
+            command = pkgutil.resolve_name("turgor.cli.app:app")
+            heed()
+        except KeyboardInterrupt as interrupt:
+            sys.stderr.write("turgor: interrupted\n")
+            sys.exit(exit_code_of(interrupt))
+        command(prog_name="turgor")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import logging
-import signal
 import tempfile
 import traceback
 from collections.abc import Iterable, Iterator
@@ -18,6 +17,7 @@ from typer.core import TyperGroup
 
 import turgor as tg
 from turgor.cli.output import leave_standard_output
+from turgor.cli.signals import exit_code_of
 from turgor.common.log import LOGGER_NAME, Relay
 
 _CommandLineError: type[Exception] = typer.BadParameter.__bases__[0]
@@ -27,13 +27,6 @@ _OF_THE_SYSTEM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.E
 """No room and no right are the machine's to say, wherever it says so."""
 
 EXIT_UNEXPECTED = 1
-EXIT_INTERRUPTED = 130
-EXIT_TERMINATED = 143
-"""What shells report for a command that Ctrl-C or `kill` ended (128 + SIGINT, 128 + SIGTERM)."""
-
-
-class Terminated(KeyboardInterrupt):
-    """Somebody, such as a queue of jobs, asks the process to end: as Ctrl-C, with a word and nothing lost."""
 
 
 class Commands(TyperGroup):
@@ -46,7 +39,7 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for."""
-        with _telling_failure(), _heeding_termination():
+        with _telling_failure():
             return super().invoke(ctx)
 
 
@@ -59,7 +52,7 @@ def _telling_failure() -> Iterator[None]:
         raise typer.Exit(error.exit_code) from error
     except KeyboardInterrupt as error:
         tell(str(error) or "interrupted")
-        raise typer.Exit(EXIT_TERMINATED if isinstance(error, Terminated) else EXIT_INTERRUPTED) from error
+        raise typer.Exit(exit_code_of(error)) from error
     except (typer.Exit, typer.Abort, BrokenPipeError, _CommandLineError):
         raise
     except Exception as error:  # the last line of defence: no user ever sees a traceback
@@ -69,18 +62,6 @@ def _telling_failure() -> Iterator[None]:
             raise typer.Exit(tg.InputError.exit_code) from error
         tell(f"unexpected {type(error).__name__}: {_one_line(error)}; please report it with {_keep(error)}")
         raise typer.Exit(EXIT_UNEXPECTED) from error
-
-
-@contextlib.contextmanager
-def _heeding_termination() -> Iterator[None]:
-    def end(number: int, frame: object) -> None:
-        raise Terminated
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager

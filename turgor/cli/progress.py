@@ -1,4 +1,7 @@
-"""How a run tells where it is: a bar on a terminal, plain lines elsewhere, always on standard error."""
+"""How a run tells where it is: a bar on a terminal, plain lines elsewhere, always on standard error.
+
+Where it tells, it also looks whether somebody wants it to end.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from turgor.cli.signals import heed
 
 
 class TerminalProgress:
@@ -34,10 +39,12 @@ class TerminalProgress:
 
     def stage(self, name: str) -> None:
         """Name what begins now."""
+        heed()
         self._bar.update(self._task, description=name, note="")
 
     def note(self, text: str) -> None:
         """Show a detail behind the bar."""
+        heed()
         self._bar.update(self._task, note=text)
 
     def tell(self, text: str) -> None:
@@ -51,6 +58,7 @@ class TerminalProgress:
     def advance(self, fraction: float, text: str) -> None:
         """Set the part of the load that is reached, 0 to 1."""
         self._bar.update(self._task, completed=fraction, note=text)
+        heed()
 
 
 class LineProgress:
@@ -69,10 +77,12 @@ class LineProgress:
 
     def stage(self, name: str) -> None:
         """Name what begins now."""
+        heed()
         self._console.print(name, highlight=False, markup=False)
 
     def note(self, text: str) -> None:
         """Leave out what the next line would repeat."""
+        heed()
 
     def tell(self, text: str) -> None:
         """Print a line."""
@@ -85,6 +95,7 @@ class LineProgress:
     def advance(self, fraction: float, text: str) -> None:
         """Say the part of the load that is reached, 0 to 1."""
         self._console.print(f"{100.0 * fraction:5.1f} %  {text}", highlight=False, markup=False)
+        heed()
 
 
 def progress_on(console: Console) -> TerminalProgress | LineProgress:
