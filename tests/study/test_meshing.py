@@ -152,6 +152,20 @@ def test_a_unit_that_makes_no_actuator_is_doubted_once(
         assert re.match(f"geometry.unit: the body is .*{doubt}", said[0])
 
 
+@pytest.mark.parametrize(("size", "doubted"), [("1e5 mm", True), ("71 mm", True), ("69 mm", False)])
+def test_elements_larger_than_a_template_are_doubted(size: str, doubted: bool, tmp_path: Path, caplog: Any) -> None:
+    tube = {"template": "tube", "inner_radius": "6 mm", "wall": "3 mm", "length": "70 mm", "cap": "6 mm"}
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump({"geometry": tube, "mesh": {"size": size}}), encoding="utf-8")
+    with caplog.at_level(logging.WARNING, "turgor.study"):
+        tg.mesh_case(tg.load_draft(tmp_path / "case.yaml"))
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == doubted
+    if doubted:
+        assert re.match(
+            r"mesh\.size: the body is 18 × 18 × 70 mm, smaller than an element of mesh\.size, .*unit", said[0]
+        )
+
+
 def test_a_template_is_not_doubted(tmp_path: Path, caplog: Any) -> None:
     small = {"template": "tube", "inner_radius": "0.06 mm", "wall": "0.03 mm", "length": "0.4 mm", "cap": "0.1 mm"}
     (tmp_path / "case.yaml").write_text(yaml.safe_dump({"geometry": small}), encoding="utf-8")

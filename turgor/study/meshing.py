@@ -91,8 +91,7 @@ def _divided(case: Draft) -> Mesh:
         if field in MeshCase.model_fields:
             raise under(error, "mesh") from error
         raise (under(error, "geometry") if field in type(case.geometry).model_fields else error) from error
-    if isinstance(case.geometry, (ImportedSolid, MeshFile)):
-        _doubt_unit(case, mesh)
+    _doubt_unit(case, mesh)
     if case.regions:
         spaces = {name: region.where for name, region in case.regions.items()}
         least = {name: region.at_least for name, region in case.regions.items()}
@@ -101,15 +100,24 @@ def _divided(case: Draft) -> Mesh:
 
 
 def _doubt_unit(case: Draft, mesh: Mesh) -> None:
-    """Warn where a body from a file is so small or large that its unit is likely to be another one."""
+    """Warn where a body is so small or large that a unit is likely to be another one.
+
+    A template is held against the size of its elements only: its lengths carry their units where they are given.
+    """
     extent = np.ptp(mesh.points, axis=0)
     largest, size = float(extent.max()), case.mesh.size
+    is_read = isinstance(case.geometry, (ImportedSolid, MeshFile))
     if size is not None and largest < size:
         doubt = f"smaller than an element of mesh.size, {size:g} mm, in all directions"
-    elif not USUAL_EXTENT[0] <= largest <= USUAL_EXTENT[1]:
+    elif is_read and not USUAL_EXTENT[0] <= largest <= USUAL_EXTENT[1]:
         doubt = f"{'smaller' if largest < USUAL_EXTENT[0] else 'larger'} than actuators are"
     else:
         return
     unit = case.geometry.model_dump(mode="json").get("unit")
-    key, check = ("unit", f"is '{unit}' its unit?") if unit else ("file", "check the unit of the file")
-    log.warning("geometry.%s: the body is %s mm, %s; %s", key, " × ".join(f"{x:.5g}" for x in extent), doubt, check)
+    if not is_read:
+        key, check = "mesh.size", "check the unit"
+    elif unit:
+        key, check = "geometry.unit", f"is '{unit}' its unit?"
+    else:
+        key, check = "geometry.file", "check the unit of the file"
+    log.warning("%s: the body is %s mm, %s; %s", key, " × ".join(f"{x:.5g}" for x in extent), doubt, check)
