@@ -165,6 +165,28 @@ def test_an_energy_of_the_users_own_locks_as_the_packages_do(energy):
     assert np.all(np.isfinite(material.uniaxial(np.array([0.6, 1.0, 1.6]))))
 
 
+@pytest.mark.parametrize(
+    "energy",
+    [
+        "mu/200*(exp(100*(I1 - 3)) - 1)",
+        "mu/200*(exp(100*(I2 - 3)) - 1)",
+        "mu/40*(exp(20*(lambda1**2 + lambda2**2 + lambda3**2 - 3)) - 1)",
+    ],
+)
+@pytest.mark.parametrize("mu", [0.05, 5.0])
+@pytest.mark.filterwarnings("error")
+def test_an_energy_that_overflows_locks_and_is_not_lost_just_before(energy, mu):
+    material = define_model({"name": "mine", "energy": energy, "constants": {"mu": {"unit": "MPa"}}})(mu=mu)
+    assert "tension" in locking(material)["equibiaxial"]
+    assert verdict(material).stable
+
+
+def test_an_energy_that_overflows_is_lost_where_it_falls():
+    energy = "mu/2*(I1 - 3)*(1 + exp(100*(I1 - 3))*(5 - I1))"
+    material = define_model({"name": "mine", "energy": energy, "constants": {"mu": {"unit": "MPa"}}})(mu=0.05)
+    assert verdict(material).lost["uniaxial"]["tension"] < 2.0
+
+
 @pytest.mark.parametrize("name", LOCKS)
 @pytest.mark.parametrize("largest", [1.2, 2.0, 6.0])
 def test_digits_are_judged_short_of_where_a_material_locks(name, largest):

@@ -34,6 +34,9 @@ _SAMPLES = 400
 _ROUNDS = 5
 """How often a loss is looked for, each time between the two samples that hold it."""
 
+_OVERFLOWING = 1e200
+"""Energy over shear modulus beyond which a curvature without a value is one too large for a number, not a loss."""
+
 _SHORT_OF_LOCKING = 0.8
 """The part of the strain at which a material locks up to which the digits of its constants are judged."""
 
@@ -106,8 +109,10 @@ def _first_loss(material: Hyperelastic, mode: str, end: float) -> float | None:
         stretches = principal_stretches(mode, np.exp(log_stretch))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             W, H = _energy_and_hessian(material, stretches)
-            locked, H = np.isposinf(W), H / material.shear_modulus
+            H = H / material.shear_modulus
             finite = np.all(np.isfinite(H), axis=(-2, -1))
+            # The derivatives of an exponential energy overflow just before it does.
+            locked = np.isposinf(W) | (~finite & (W / material.shear_modulus > _OVERFLOWING))
             found = _smallest_eigenvalue(np.where(finite[..., None, None], H, -IDENTITY))
         return np.asarray(np.where(locked, 1.0, found), dtype=float)
 
