@@ -5,7 +5,7 @@ from __future__ import annotations
 import pkgutil
 import sys
 
-from turgor.cli.signals import exit_code_of, heed, heeding_signals
+from turgor.cli.signals import exit_code_of, heed, heeding_in_errors, heeding_signals
 
 
 def main() -> None:
@@ -13,7 +13,8 @@ def main() -> None:
     with heeding_signals():
         try:
             # By its name: what it imports takes a while, in which Ctrl-C is heeded already.
-            command = pkgutil.resolve_name("turgor.cli.app:app")
+            with heeding_in_errors():
+                command = pkgutil.resolve_name("turgor.cli.app:app")
             heed()
         except KeyboardInterrupt as interrupt:
             sys.stderr.write("turgor: interrupted\n")

@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 import turgor as tg
 from turgor.cli.output import leave_standard_output
-from turgor.cli.signals import exit_code_of
+from turgor.cli.signals import exit_code_of, heeding_in_errors
 from turgor.common.log import LOGGER_NAME, Relay
 
 _CommandLineError: type[Exception] = typer.BadParameter.__bases__[0]
@@ -46,7 +46,8 @@ class Commands(TyperGroup):
 @contextlib.contextmanager
 def _telling_failure() -> Iterator[None]:
     try:
-        yield
+        with heeding_in_errors():
+            yield
     except tg.TurgorError as error:
         tell(str(error))
         raise typer.Exit(error.exit_code) from error

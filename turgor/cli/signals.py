@@ -58,6 +58,16 @@ def heed() -> None:
         raise _came[-1]
 
 
+@contextlib.contextmanager
+def heeding_in_errors() -> Iterator[None]:
+    """Raise what has come instead of an error: libraries make one of it, as pydantic does of a schema cut short."""
+    try:
+        yield
+    except Exception:
+        heed()
+        raise
+
+
 def exit_code_of(interrupt: KeyboardInterrupt) -> int:
     """Return the exit code of a command that was ended so."""
     return EXIT_TERMINATED if isinstance(interrupt, Terminated) else EXIT_INTERRUPTED
