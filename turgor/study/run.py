@@ -18,6 +18,7 @@ from turgor.common.log import logger
 from turgor.common.names import PRESSURE_PREFIX
 from turgor.common.units import from_internal
 from turgor.common.writing import UnwritableError
+from turgor.fem.contact.term import LARGEST_OVERLAP
 from turgor.fem.system import System
 from turgor.mesh import Mesh
 from turgor.results.archive import Row
@@ -259,8 +260,8 @@ class _Running:
                 if volume < 0.0
             ),
             "are seen to overlap": (
-                f"contact '{name}': the surfaces are seen to overlap by more than 1 % of the wall "
-                f"at step {record.index}"
+                f"contact '{name}': the surfaces are seen to overlap by more than "
+                f"{100.0 * LARGEST_OVERLAP:g} % of the wall at step {record.index}"
                 for name, touch in record.standing.get("contact", {}).items()
                 if touch.get("surfaces_intersect")
             ),
