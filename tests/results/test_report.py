@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import shutil
@@ -227,6 +228,29 @@ def test_curves_begin_at_rest_and_mark_unstable_states(tmp_path: Path, small_fin
     rest = report_module._rest_row(RunStore.open(tmp_path / "run"), history[0])
     assert rest["bending_angle_deg"] == pytest.approx(0.0)
     assert rest["cavity_volume_mm3"] == pytest.approx(small_finger.enclosed_volume("cavity"))
+
+
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize("gaps", [(None, 0.25), (0.25, None)])
+def test_a_gap_that_only_some_states_know_has_a_column_of_its_own(
+    tmp_path: Path, small_finger: Mesh, gaps: tuple[float | None, ...]
+) -> None:
+    with RunStore.create(tmp_path, small_finger, CASE) as store:
+        for index, gap in enumerate(gaps):
+            facts = {"area_mm2": 7.0, "gap_mm": gap, "gap_per_wall": gap, "force_N": [0.0, 0.0, 3.0]}
+            record = bent_record(small_finger, index, 0.5 * (index + 1))
+            store.append(dataclasses.replace(record, standing={"contact": {"plate": facts}}))
+    history = store.history
+    assert [entry["contact_plate_gap_mm"] for entry in history] == list(gaps)
+    table = re.search(r"Every step.*?</table>", report(tmp_path).read_text(encoding="utf-8"), re.DOTALL)
+    assert table
+    columns = re.findall("<th>(.*?)</th>", table[0])
+    for written, entry in zip(table[0].split("<tbody>")[1].split("<tr>")[1:], history, strict=True):
+        shown = dict(zip(columns, re.findall("<td>(.*?)</td>", written), strict=True))
+        assert shown == {key: number(value) for key, value in entry.items()}
+    rest = report_module._rest_row(store, history[0])
+    assert rest.get("contact_plate_gap_mm") is None  # zero would be a touch
+    assert groups(history)["Contact"]["Smallest gap in parts of the wall"]
 
 
 def test_a_section_of_zeros_is_told_in_words() -> None:

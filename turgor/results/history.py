@@ -86,7 +86,10 @@ def _volumes(volumes: Mapping[str, float]) -> Row:
 
 
 def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
-    """Area, overlap and force of each contact; of force on and displacement of a rigid body also the size."""
+    """Area, overlap and force of each contact; of force on and displacement of a rigid body also the size.
+
+    What a contact does not know in this state is ``None``, so that all states have the same columns.
+    """
     columns: Row = {}
     for name, facts in standing.items():
         for key, value in facts.items():
@@ -97,8 +100,8 @@ def _contacts(standing: Mapping[str, Mapping[str, Any]]) -> Row:
                 }
                 size = {f"contact_{name}_{key}": math.hypot(*value)} if quantity in ("force", "displacement") else {}
                 columns |= {**parts, **size}
-            elif value is not None:
-                columns[f"contact_{name}_{key}"] = float(value)
+            else:
+                columns[f"contact_{name}_{key}"] = None if value is None else float(value)
     return columns
 
 

@@ -86,6 +86,8 @@ def report(folder: str | Path) -> Path:
         "plotly_js": get_plotlyjs(),
         "fit": _fit_section(store.fit),
         "history": store.history,
+        # Rows of older runs may lack columns that others have.
+        "columns": list(dict.fromkeys(key for entry in store.history for key in entry)),
         "mesh": _mesh_facts(store.body),
     }
     if store.n_steps:
@@ -208,7 +210,9 @@ def _rest_row(store: RunStore, first: Row) -> Row:
     """The row of the body at rest, so that the curves begin where the motion does."""
     rest = np.zeros_like(store.mesh.points)
     volumes = [store.body.enclosed_volume(name, rest) for name in store.load(0).cavity_volumes]
-    zeros = {key: 0.0 for key, value in first.items() if isinstance(value, float)}
+    zeros: Row = {key: 0.0 for key, value in first.items() if isinstance(value, float)}
+    # A gap of zero would be a touch; how far surfaces are apart at rest is not stored.
+    zeros |= {key: None for key in zeros if key.startswith("contact_") and key.endswith(("_gap_mm", "_gap_per_wall"))}
     volume = {"cavity_volume_mm3": sum(volumes)} if volumes else {}
     return {**zeros, **volume, **evaluate(store.measures, store.body.at_rest()), "stable": True}
 
