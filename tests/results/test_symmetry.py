@@ -11,6 +11,8 @@ from results.hollow_finger import LENGTH, hollow_finger, moved, rod
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.structured import box, rectangle, tube_sector
+from turgor.results import report as report_module
+from turgor.results.drawing import drawing_of
 from turgor.results.measures import evaluate
 from turgor.results.stored import Body
 from turgor.results.symmetry import symmetry_of
@@ -68,6 +70,15 @@ def test_a_quarter_has_four_images_and_its_middle_on_the_axis() -> None:
     assert len(whole.turns) == 4
     assert whole.places(mesh.points).mean(axis=0) == pytest.approx([0.0, 0.0, mesh.points[:, 2].mean()])
     assert whole.middle(np.array([3.0, 4.0, 5.0])) == pytest.approx([0.0, 0.0, 5.0])
+
+
+@pytest.mark.parametrize("cuts", [{"symmetry-x": ["x0"], "symmetry-y": ["y0"]}, {"symmetry": ["x0", "y0"]}])
+def test_a_quarter_is_told_and_drawn_as_one_however_its_cuts_are_named(cuts: dict[str, list[str]]) -> None:
+    mesh = quarter_tube(cuts)
+    assert report_module._part(mesh) == "quarter"
+    assert sorted(drawing_of(Body(mesh)).cuts.tolist()) == [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    assert report_module._part(HALF) == "half"
+    assert report_module._part(hollow_finger((6, 3, 3))) is None
 
 
 def test_planes_at_sixty_degrees_have_six_images() -> None:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh, in_space
+from turgor.mesh.symmetry import planes_of_symmetry
 from turgor.mesh.tet10 import IntArray
 from turgor.results.camera import AZIMUTH
 from turgor.results.skin import compact, outside_faces, six_node_triangles
@@ -66,11 +67,9 @@ def drawing_of(body: Body) -> Drawing:
 
 def _cuts(mesh: Mesh) -> FloatArray:
     """Return the axes, with their signs, that the planes of symmetry of a body in space face most."""
-    names = mesh.symmetry_planes if mesh.dimension == 3 else ()
-    cuts = np.zeros((len(names), 3))
-    for cut, name in zip(cuts, names, strict=True):
-        a, b, c = np.moveaxis(mesh.points[mesh.surface(name)[:, :3]], 1, 0)
-        normal = np.cross(b - a, c - a).sum(axis=0)
+    normals = [plane.normal for plane in planes_of_symmetry(mesh)] if mesh.dimension == 3 else []
+    cuts = np.zeros((len(normals), 3))
+    for cut, normal in zip(cuts, normals, strict=True):
         axis = int(np.argmax(np.abs(normal)))
         cut[axis] = np.sign(normal[axis])
     return cuts

@@ -16,7 +16,9 @@ import yaml
 from plotly.offline import get_plotlyjs
 
 from turgor.common.errors import MissingPackageError
+from turgor.mesh.mesh import Mesh
 from turgor.mesh.quality import quality
+from turgor.mesh.symmetry import part_in_front, planes_of_symmetry
 from turgor.results import animation, curve_plots, plots
 from turgor.results.archive import Row
 from turgor.results.camera import camera_for
@@ -32,8 +34,10 @@ _N_MODES = 2
 _MODE_SIZE = 0.1
 """Largest displacement of a mode in its picture, in parts of the size of the body."""
 
-_PARTS = {1: "half", 2: "quarter", 3: "eighth"}
-"""What is left of a body by the number of planes of symmetry that cut it."""
+_PARTS = {2: "half", 4: "quarter", 8: "eighth"}
+"""What is left of a body by how many of it make the whole."""
+
+_MOST_PLANES = 3
 
 _SCENE_ASPECT = 1.6
 _SIGNIFICANT = 4
@@ -146,7 +150,7 @@ def _states_section(store: RunStore) -> dict[str, Any]:
     return {
         "cards": _cards(history),
         "unstable": any(entry.get("stable") is False for entry in history),
-        "part": _PARTS.get(len(store.mesh.symmetry_planes)),
+        "part": _part(store.mesh),
         "motion": _as_json(plots.load_motion(curve)),
         "extra": _extra_figures(store, curve),
         "scene": _as_json(plots.body_scene(box.low, box.high, camera, scale_max)),
@@ -155,6 +159,13 @@ def _states_section(store: RunStore) -> dict[str, Any]:
         "pictures": pictures,
         "pictures_note": note,
     }
+
+
+def _part(mesh: Mesh) -> str | None:
+    """Return what part of the whole a mesh is that planes of symmetry cut, however many surfaces they lie in."""
+    normals = np.array([plane.normal for plane in planes_of_symmetry(mesh)]).reshape(-1, mesh.dimension)
+    part = part_in_front(normals) if len(normals) <= _MOST_PLANES else 0.0
+    return _PARTS.get(round(1.0 / part)) if part > 0.0 else None
 
 
 def _extra_figures(store: RunStore, history: Sequence[Row]) -> list[dict[str, Any]]:
