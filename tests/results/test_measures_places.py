@@ -13,7 +13,7 @@ from turgor.common.errors import InputError
 from turgor.geometry.section import PlaneSection
 from turgor.mesh.faces import boundary_faces
 from turgor.mesh.mesh import Mesh
-from turgor.mesh.structured import rectangle
+from turgor.mesh.structured import box, rectangle
 from turgor.results.measures import Choice, check, evaluate
 from turgor.results.stored import Body, StoredState
 
@@ -209,6 +209,16 @@ def test_a_table_that_is_not_well_formed_is_refused(tmp_path: Path, change: tupl
 def test_what_cannot_be_measured_is_refused_before_a_run(choice: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         check([Choice.read(choice)], FINGER)
+
+
+@pytest.mark.parametrize("other", ["far", "near"])
+def test_regions_that_do_not_touch_have_no_interface(other: str) -> None:
+    bar = box((9.0, 1.0, 1.0), (3, 1, 1), "hex27")
+    cells = {name: np.array([k], np.int32) for k, name in enumerate(("near", "middle", "far"))}
+    body = Body(Mesh(bar.points, bar.cells, regions=cells, surfaces=bar.surfaces))
+    check([Choice.read({"interface_stress": {"first": "middle", "second": other}})], body)
+    with pytest.raises(InputError, match=f"interface_stress.second: the two regions have no interface.*'{other}'"):
+        check([Choice.read({"interface_stress": {"first": "near", "second": other}})], body)
 
 
 def test_two_measures_of_a_kind_need_names() -> None:

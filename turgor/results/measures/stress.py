@@ -12,6 +12,7 @@ from turgor.fem.fields import weighted_percentile
 from turgor.fem.interface import interface_name
 from turgor.fem.section import depth, surface_areas
 from turgor.mesh.cells import determinants, face_cell, jacobians
+from turgor.mesh.faces import shared_faces
 from turgor.mesh.mesh import Mesh
 from turgor.results.measures.registry import measure
 from turgor.results.stored import StoredState
@@ -63,12 +64,21 @@ def interface_stress(state: StoredState, *, first: str, second: str) -> FloatArr
         if region not in state.mesh.regions:
             expected = f"one of: {', '.join(state.mesh.regions)}"
             raise InputError("the mesh has no such region", key=key, value=region, expected=expected)
+    if not _touch(state.mesh, first, second):
+        expected = "two regions that have faces in common"
+        raise InputError("the two regions have no interface", key="second", value=second, expected=expected)
     found = state.record.standing.get("interfaces", {})
     facts = found.get(interface_name(first, second)) or found.get(interface_name(second, first)) or {}
     return np.array([facts.get(key, 0.0) for key in _INTERFACE])
 
 
 _INTERFACE = ("traction_max_MPa", "traction_p99_MPa", "traction_mean_MPa", "normal_max_MPa", "shear_max_MPa")
+
+
+@lru_cache(maxsize=32)
+def _touch(mesh: Mesh, first: str, second: str) -> bool:
+    cells = [mesh.cells[mesh.region(name)] for name in (first, second)]
+    return first != second and len(shared_faces(*cells)) > 0
 
 
 def _on_faces(state: StoredState, region: str, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
