@@ -115,6 +115,26 @@ def test_elongation_of_a_straight_and_of_a_bent_body(stretch: float) -> None:
     assert bent["elongation_mm"] == pytest.approx((stretch - 1.0) * LENGTH, abs=1e-3 * LENGTH)
 
 
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("at_rest", [90.0, 180.0])
+def test_a_body_that_is_curved_at_rest_is_measured_along_its_centreline(at_rest: float, half: bool) -> None:
+    straight, arc = hollow_finger(half=half), math.radians(at_rest)
+    points = straight.points + rod(straight.points, arc)
+    mesh = Mesh(points, straight.cells, surfaces=straight.surfaces, markers=straight.markers)
+    names = ["bending_angle", "elongation", "twist"]
+
+    def found(bending: float, twist: float = 0.0, stretch: float = 1.0) -> dict[str, float]:
+        return evaluate(names, mesh, straight.points + rod(straight.points, bending, twist, stretch) - points)
+
+    longer = found(arc + math.radians(100.0), stretch=1.2)
+    assert longer["bending_angle_deg"] == pytest.approx(100.0, rel=1e-6)
+    # Chords between the middles of slices are shorter than the arc.
+    assert longer["elongation_mm"] == pytest.approx(0.2 * LENGTH, rel=1e-2)
+    assert evaluate(names, mesh, 0.1 * points)["elongation_mm"] == pytest.approx(0.1 * LENGTH, rel=1e-2)
+    if not half:
+        assert found(arc, math.radians(60.0))["twist_deg"] == pytest.approx(60.0, rel=1e-2)
+
+
 def test_tip_displacement_is_that_of_the_end_of_an_arc() -> None:
     angle = math.radians(130.0)
     result = evaluate(["tip_displacement"], FINGER, rod(FINGER.points, angle))

@@ -55,10 +55,10 @@ class Motion:
 def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
     """Return how the tip face has moved against the mount.
 
-    With Q_i the rotations of the slices, a the body's axis and t_i the axis carried along, each small rotation vector
-    log(Q_{i+1} Q_iᵀ) is split along and across t_i. Twist is the sum of the parts along. The sum of the parts across
-    gives the axis and the number of whole turns of the bending, whose angle is that between the axes of the two faces.
-    The length is that of circular arcs from centre to centre.
+    With Q_i the rotations of the slices, a_i the direction of the reference line from slice to slice at rest and t_i
+    this carried along, each small rotation vector log(Q_{i+1} Q_iᵀ) is split along and across t_i. Twist is the sum of
+    the parts along. The sum of the parts across gives the axis and the number of whole turns of the bending, whose
+    angle is that between the axes of the two faces. The length is that of circular arcs from centre to centre.
 
     Parameters
     ----------
@@ -72,11 +72,9 @@ def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
     InputError
         If the mesh lacks one of the two surfaces.
     """
-    rotations, before, after = _fitted_slices(mesh, displacement)
-    axis = _axis(mesh)
+    rotations, before, after, tangents = _fitted_slices(mesh, displacement)
     steps = (rotations[1:] * rotations[:-1].inv()).as_rotvec()
-    carried = rotations.apply(axis)
-    middle = carried[1:] + carried[:-1]
+    middle = rotations[1:].apply(tangents) + rotations[:-1].apply(tangents)
     middle /= np.linalg.norm(middle, axis=1)[:, None]
     along = np.einsum("ij,ij->i", steps, middle)
     across = steps - along[:, None] * middle
@@ -84,9 +82,9 @@ def motion(mesh: Mesh, displacement: FloatArray) -> Motion:
     chords = np.einsum("ij,ij->i", np.diff(after, axis=0), middle)
     arcs = chords / np.sinc(np.linalg.norm(across, axis=1) / (2.0 * math.pi))
     return Motion(
-        bending=_unwrapped_angle(carried, across.sum(axis=0)),
+        bending=_unwrapped_angle(rotations.apply(_axis(mesh)), across.sum(axis=0)),
         twist=float(along.sum()),
-        elongation=float(arcs.sum() - (np.diff(before, axis=0) @ axis).sum()),
+        elongation=float(arcs.sum() - np.einsum("ij,ij->", np.diff(before, axis=0), tangents)),
     )
 
 
@@ -114,36 +112,44 @@ def _unwrapped_angle(carried: FloatArray, accumulated: FloatArray) -> float:
     return abs(angle + 2.0 * math.pi * whole_turns)
 
 
-def _fitted_slices(mesh: Mesh, displacement: FloatArray) -> tuple[Rotation, FloatArray, FloatArray]:
-    """Rotation of each slice and its centre before and after, ``(k, 3)``, from the mount to the tip face."""
-    rotations, before, after = [], [], []
-    for nodes, at_rest, now in _groups(mesh, displacement):
+def _fitted_slices(mesh: Mesh, displacement: FloatArray) -> tuple[Rotation, FloatArray, FloatArray, FloatArray]:
+    """Rotation of each slice, its centre before and after, and the line's directions at rest to the next ``(k, 3)``."""
+    rotations, before, after, stations = [], [], [], []
+    for nodes, station, at_rest, now in _groups(mesh, displacement):
         rotation = _rotation_of_whole(mesh, displacement, nodes)
         if rotation is not None:
             rotations.append(rotation)
             before.append(in_space(at_rest))
             after.append(in_space(now))
-    return Rotation.from_matrix(np.array(rotations)), np.array(before), np.array(after)
+            stations.append(station)
+    tangents = np.array([_direction(mesh, step) for step in np.diff(stations, axis=0)])
+    return Rotation.from_matrix(np.array(rotations)), np.array(before), np.array(after), tangents
 
 
-def _groups(mesh: Mesh, displacement: FloatArray) -> Iterator[tuple[npt.NDArray[Any], FloatArray, FloatArray]]:
-    """Yield the nodes of the mount, of each slice and of the tip face, with the centre ``(d,)`` before and after."""
-    whole, places = symmetry_of(mesh), mesh.points + displacement
-    yield mesh.surface_nodes(MOUNT), surface_middle(mesh, MOUNT), surface_middle(mesh, MOUNT, displacement)
-    for nodes in _slices(mesh):
+def _groups(mesh: Mesh, displacement: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray, FloatArray]]:
+    """Yield the nodes of the mount, of each slice and of the tip face, its station, and its centre before and after."""
+    whole, places, stations = symmetry_of(mesh), mesh.points + displacement, _stations(mesh)
+    ends = [(surface_middle(mesh, name), surface_middle(mesh, name, displacement)) for name in (MOUNT, TIP_FACE)]
+    yield mesh.surface_nodes(MOUNT), stations[0], *ends[0]
+    for nodes, station in zip(_slices(mesh), stations[1:-1], strict=True):
         if len(nodes):
-            yield nodes, whole.middle(mesh.points[nodes].mean(axis=0)), whole.middle(places[nodes].mean(axis=0))
-    yield mesh.surface_nodes(TIP_FACE), surface_middle(mesh, TIP_FACE), surface_middle(mesh, TIP_FACE, displacement)
+            centres = (whole.middle(where[nodes].mean(axis=0)) for where in (mesh.points, places))
+            yield nodes, station, *centres
+    yield mesh.surface_nodes(TIP_FACE), stations[-1], *ends[1]
 
 
 def _slices(mesh: Mesh) -> list[npt.NDArray[np.intp]]:
     """Nodes of each slice, by the station of the reference line that is nearest."""
+    nearest = KDTree(_stations(mesh)[1:-1]).query(mesh.points)[1]
+    return [np.flatnonzero(nearest == station) for station in range(SLICES)]
+
+
+def _stations(mesh: Mesh) -> FloatArray:
+    """Return the places on the reference line of the mount, of each slice and of the tip face, ``(SLICES + 2, d)``."""
     line = _reference_line(mesh)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    stations = (np.arange(SLICES) + 0.5) / SLICES * lengths[-1]
-    places = np.column_stack([np.interp(stations, lengths, coordinate) for coordinate in line.T])
-    nearest = KDTree(places).query(mesh.points)[1]
-    return [np.flatnonzero(nearest == station) for station in range(SLICES)]
+    stations = np.concatenate([[0.0], (np.arange(SLICES) + 0.5) / SLICES, [1.0]]) * lengths[-1]
+    return np.column_stack([np.interp(stations, lengths, coordinate) for coordinate in line.T])
 
 
 def _reference_line(mesh: Mesh) -> FloatArray:
@@ -155,7 +161,12 @@ def _reference_line(mesh: Mesh) -> FloatArray:
 def _axis(mesh: Mesh) -> FloatArray:
     """Unit vector along the reference line where it reaches the tip face."""
     line = _reference_line(mesh)
-    direction = symmetry_of(mesh).along(line[-1] - line[-2])
+    return _direction(mesh, line[-1] - line[-2])
+
+
+def _direction(mesh: Mesh, vector: FloatArray) -> FloatArray:
+    """Unit vector ``(3,)`` along the part of a `vector` ``(d,)`` that its images share."""
+    direction = symmetry_of(mesh).along(vector)
     return np.asarray(in_space(direction / np.linalg.norm(direction)))
 
 
