@@ -251,6 +251,10 @@ def test_a_gap_that_only_some_states_know_has_a_column_of_its_own(
     rest = report_module._rest_row(store, history[0])
     assert rest.get("contact_plate_gap_mm") is None  # zero would be a touch
     assert groups(history)["Contact"]["Smallest gap in parts of the wall"]
+    assert list(groups([{**entry, "contact_plate_gap_per_wall": None} for entry in history])["Contact"]) == [
+        "Force / N",
+        "Area in contact / mm²",
+    ]
 
 
 def test_a_section_of_zeros_is_told_in_words() -> None:

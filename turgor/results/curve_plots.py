@@ -32,10 +32,10 @@ MOST_LINES = 8
 def groups(history: Sequence[Row]) -> dict[str, dict[str, list[tuple[str, str]]]]:
     """Return the columns that have a figure: section → axis title → (key, name of the line).
 
-    Of many lines with one axis those that end highest.
+    Of many lines with one axis those that end highest; none of what no state knows.
     """
     found: dict[str, dict[str, list[tuple[str, str]]]] = {}
-    columns = history[-1]
+    columns = {key: value for key, value in history[-1].items() if any(row.get(key) is not None for row in history)}
     for section, begin, end, title in _KINDS:
         keys = [key for key in columns if key.startswith(begin) and key.endswith(end)]
         lines = [(key, key.removeprefix(begin).removesuffix(end).strip("_") or "all") for key in keys]
