@@ -50,6 +50,14 @@ def test_an_arc_has_one_curvature_and_no_torsion(by: str, degrees: float) -> Non
     assert np.linalg.norm(line[:, X : Z + 1] - centre, axis=1) == pytest.approx(radius, rel=2e-4)
 
 
+@pytest.mark.parametrize("stations", [7, 8, 12, 20])
+def test_few_stations_follow_an_arc_of_nearly_a_full_turn(stations: int) -> None:
+    angle = math.radians(311.0)
+    line = measured(FINGER, rod(FINGER.mesh.points, angle), "centreline", stations=stations)
+    assert line[1:-1, CURVATURE] == pytest.approx(angle / LENGTH, rel=2e-2)
+    assert line[:, CURVATURE] == pytest.approx(angle / LENGTH, rel=0.15)
+
+
 @pytest.mark.parametrize("pitch", [40.0, -25.0])
 @pytest.mark.parametrize("by", ["sections", "opposite"])
 def test_a_helix_has_its_curvature_torsion_radius_and_pitch(pitch: float, by: str) -> None:

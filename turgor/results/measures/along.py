@@ -25,9 +25,9 @@ Stations = Annotated[int, Field(strict=True, ge=7, le=1000)]
 By = Literal["sections", "marker", "opposite"]
 Vector = tuple[float, float, float]
 
-_DEGREE, _STATIONS_PER_PIECE = 5, 4
+_DEGREE, _STATIONS_PER_PIECE, _FEWEST_PIECES = 5, 4, 2
 """Of the spline along the stations. Torsion takes its third derivative, and pieces of several stations leave out what
-the elements add to a line from one to the next."""
+the elements add to a line from one to the next. A single polynomial cannot follow an arc of much more than 180°."""
 
 STRAIGHT = 1e-3
 """A line that leaves its chord by no more than this part of its length is no coil."""
@@ -102,7 +102,7 @@ def _lengths(places: FloatArray) -> FloatArray:
 def _fitted(places: FloatArray) -> tuple[Any, FloatArray]:
     """Return the spline that fits places best in the mean square, over their chord length, and these lengths."""
     at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
-    pieces = max(1, len(places) // _STATIONS_PER_PIECE)
+    pieces = max(_FEWEST_PIECES, len(places) // _STATIONS_PER_PIECE)
     ends = np.interp(np.linspace(0.0, len(places) - 1.0, pieces + 1), np.arange(len(places)), at)
     knots = np.concatenate([np.full(_DEGREE, at[0]), ends, np.full(_DEGREE, at[-1])])
     return make_lsq_spline(at, places, knots, k=_DEGREE), at
