@@ -20,9 +20,9 @@ from turgor.results.stored import StoredState
 def row(state: StoredState, measures: Iterable[Choice]) -> Row:
     """Return the row of a step.
 
-    ``pressure_kPa`` is the pressure of largest size and ``cavity_volume_mm3`` the volume of all cavities; where there
-    are several cavities each also has its own columns. How each contact and each fibre stands has columns of its own. A
-    measure that is not a number in this state is ``None``.
+    ``pressure_kPa`` is the pressure of largest size and ``cavity_volume_mm3`` the volume of all cavities under
+    pressure; where there are several of them each also has its own columns. How each contact and each fibre stands has
+    columns of its own. A measure that is not a number in this state is ``None``.
 
     Parameters
     ----------

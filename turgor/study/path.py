@@ -132,7 +132,7 @@ class Path:
 
     @property
     def cavity_volume(self) -> pint.Quantity[Any]:
-        """Volume of all cavities in mm³, shape ``(steps,)``."""
+        """Volume of all cavities under pressure in mm³, shape ``(steps,)``."""
         return self.series("cavity_volume")
 
     @property
