@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import neo_hookean
+from samples import arch, neo_hookean
 
 from turgor.common.errors import InputError
 from turgor.fem.loads import Pressure
@@ -13,7 +13,8 @@ from turgor.fem.section import Axisymmetric, PlaneStrain
 from turgor.fem.supports import Sliding
 from turgor.fem.system import System
 from turgor.mesh.structured import quarter_ring
-from turgor.solver.path import LimitPressureError, solve_path
+from turgor.solver.events import Event
+from turgor.solver.path import LimitPressureError, PathOptions, solve_path
 
 UP_AND_DOWN = Programme((0.0, 0.3, 0.6, 1.0), (0.0, 1.0, 1.0, 0.25))
 
@@ -59,6 +60,31 @@ def test_the_limit_is_found_on_a_later_line_of_a_programme():
     assert 0.5 < stop.value.facts["last_fraction"] < 1.0
 
 
-def sphere(programme):
-    loads = [Pressure("inner", 0.04, programme)]
+def sphere(programme, pressure=0.04):
+    loads = [Pressure("inner", pressure, programme)]
     return System(quarter_ring(1.0, 1.5, 2), {"body": neo_hookean()}, [Sliding("y0")], loads, section=Axisymmetric())
+
+
+def test_how_far_the_load_falls_behind_a_limit_is_told_by_the_pressure_and_not_by_the_time():
+    steep = Programme((0.0, 0.5, 1.0), (0.0, 0.5, 2.0))
+    facts = []
+    for system in (sphere(PROPORTIONAL, 0.08), sphere(steep)):
+        with pytest.raises(LimitPressureError, match="rising to the limit again") as stop:
+            solve_path(system, [0.5, 1.0], options=PathOptions(post_snap=True))
+        facts.append(stop.value.facts["lowest_load_behind_limit"])
+    assert facts == pytest.approx([0.2, 0.2], abs=0.01)
+
+
+def test_the_way_back_behind_a_limit_does_not_heed_the_plateau_before_it():
+    # Where the walk passes it nothing grows by the programme: its states were called unstable.
+    with_plateau = Programme((0.0, 0.3, 0.6, 1.0), (0.0, 0.6, 0.6, 1.0))
+    plain, programmed = (
+        next(
+            e
+            for e in solve_path(system, [0.25, 0.5, 0.75, 1.0], options=PathOptions(post_snap=True))
+            if e.event is Event.POST_SNAP
+        )
+        for system in (arch(1.69e-4), arch(1.69e-4, programme=with_plateau))
+    )
+    assert programmed.factorisations <= 1.5 * plain.factorisations
+    assert programmed.state.u == pytest.approx(plain.state.u, abs=1e-5)

@@ -7,6 +7,8 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.solver.apart import kept_apart
@@ -70,13 +72,13 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
                 ended = f"and the state at the limit's loads was enclosed but not found ({error.reason})"
                 break
         previous, lowest = found, min(lowest, found.fraction)
-        if rest and abs(walk.measure(found)) > MOST_VOLUMES * abs(rest):
+        if _volume_ratio(walk, found) > MOST_VOLUMES:
             ended = "at a volume that no rubber reaches"
             break
     else:
         if walk.failure is not None:
             ended = f"where the walk ended ({walk.failure.reason})"
-    raise at_limit(walk.system, limit, *_why(walk, previous, lowest / goal, abs(rest), ended))
+    raise at_limit(walk.system, limit, *_why(walk, previous, _part_of(walk, lowest, goal), ended))
 
 
 def _behind(
@@ -142,9 +144,26 @@ def _lies_between(walk: VolumeWalk, below: Equilibrium, found: Equilibrium, abov
     return abs(place - 0.5 * (low + high)) <= (0.5 + BESIDE) * abs(high - low)
 
 
-def _why(walk: VolumeWalk, last: Equilibrium, lowest: float, rest: float, ended: str) -> tuple[str, Facts]:
+def _part_of(walk: VolumeWalk, fraction: float, goal: float) -> float:
+    """Return the load that changes most at one load fraction in parts of what it is at another."""
+    leading = walk.system.loading.leading(walk.line.growth)
+    now, whole = (float(walk.line.at(f)[leading]) for f in (fraction, goal))
+    return now / whole if whole else float("nan")
+
+
+def _volume_ratio(walk: VolumeWalk, found: Equilibrium) -> float:
+    """Return the volume in parts of that at rest; not a number where there was none.
+
+    Where cavities grow against each other their conjugates may add up to nothing, so that they count by size.
+    """
+    weights = np.abs(walk.line.growth)
+    now, rest = (walk.system.conjugate(state, weights) for state in (found.state, walk.system.reference_state()))
+    return abs(now / rest) if rest else float("nan")
+
+
+def _why(walk: VolumeWalk, last: Equilibrium, lowest: float, ended: str) -> tuple[str, Facts]:
     """Say how far the branch behind a limit was followed, and what it was like there."""
-    ratio = abs(walk.measure(last)) / rest if rest else float("nan")
+    ratio = _volume_ratio(walk, last)
     worst = worst_point(walk.system, last)
     text = (
         f"; behind it no state under the same loads was found: the branch was followed to {ratio:.3g} times the volume "

@@ -347,7 +347,7 @@ class VolumeWalk:
 
     def is_stable(self, equilibrium: Equilibrium) -> bool | None:
         """Say whether a state is stable while the quantity is held; ``None`` if that is not known."""
-        return stable_while_held(self.system, self.quantity, equilibrium)
+        return stable_while_held(self.system, self.quantity, equilibrium, self.line.growth)
 
     def loses_stability(self, before: Equilibrium, found: Equilibrium) -> bool:
         """Say whether a state is unstable while the quantity is held, and the one before it was not seen to be."""
@@ -413,15 +413,18 @@ def is_monotone(mean: float, at_start: float, at_end: float) -> bool:
     return mean * at_start > 0.0 and math.hypot(at_start, at_end) <= MONOTONE * abs(mean)
 
 
-def stable_while_held(system: System, quantity: Quantity, equilibrium: Equilibrium) -> bool | None:
+def stable_while_held(
+    system: System, quantity: Quantity, equilibrium: Equilibrium, growth: Floats | None = None
+) -> bool | None:
     """Say whether a state is stable while a quantity is held; ``None`` if that is not known.
 
     Holding it adds κ q qᵀ to the tangent, κ > 0, q the direction of the loads: nothing that a stable state loses by; it
-    takes away a negative eigenvalue where 1 + κ qᵀK⁻¹q < 0. Loads that grow against each other have no such q.
+    takes away a negative eigenvalue where 1 + κ qᵀK⁻¹q < 0. Loads that grow against each other have no such q. The
+    loads' `growth` is that of the line that the path was found along; left out, what their programmes say.
     """
     if equilibrium.negative_pivots is None or equilibrium.compliance is None or equilibrium.negative_pivots == 0:
         return equilibrium.stable
-    growth = system.loading.growth(equilibrium.fraction)
+    growth = system.loading.growth(equilibrium.fraction) if growth is None else growth
     weights = growth if quantity.weights is None else quantity.weights
     signs = np.unique(np.sign(growth[weights != 0.0] * weights[weights != 0.0]))
     if len(signs) != 1:
