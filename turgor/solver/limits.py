@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from turgor.common.log import logger
+from turgor.fem.programme import LoadLine
 from turgor.fem.state import State
 from turgor.solver.apart import kept_apart
+from turgor.solver.apiece import taking_part
 from turgor.solver.arc import Arc
+from turgor.solver.control import Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
 from turgor.solver.stops import Facts, at_limit, worst_point
@@ -55,6 +59,7 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
     StoppedShortError
         If the branch does not rise to the limit again as far as it could be followed.
     """
+    walk, beyond = _alone(walk, limit, beyond)
     goal = limit.equilibrium.fraction
     rest = walk.system.conjugate(walk.system.reference_state(), walk.quantity.weights)
     previous, lowest = beyond, beyond.fraction
@@ -79,6 +84,26 @@ def after_snap(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium, tally: 
         if walk.failure is not None:
             ended = f"where the walk ended ({walk.failure.reason})"
     raise at_limit(walk.system, limit, *_why(walk, previous, _part_of(walk, lowest, goal), ended))
+
+
+def _alone(walk: VolumeWalk, limit: LimitPoint, beyond: Equilibrium) -> tuple[VolumeWalk, Equilibrium]:
+    """Return a walk from the limit on, and its first state: only the loads change that take part in the limit's mode.
+
+    Those that do not are held as they are while the actuator snaps: on the way back they may be greater, and have
+    limits of their own. Where all take part, or no state is found, it is the walk itself.
+    """
+    at, growth = limit.equilibrium, walk.line.growth
+    part = taking_part(walk.system, at.state, limit.mode, growth)
+    if np.array_equal(part, growth):
+        return walk, beyond
+    quantity, line = Volume(part), LoadLine(at.fraction, at.state.loads, part)
+    states = (walk.system.reference_state(), at.state, beyond.state)
+    rest, here, there = (walk.system.conjugate(state, part) for state in states)
+    step = math.copysign(max(abs(there - here), ARC_STEP * abs(here - rest)), there - here)
+    start = replace(at, compliance=None)
+    alone = VolumeWalk(walk.system, walk.linear, start, step, walk.options, quantity, line=line)
+    found = alone.advance()
+    return (walk, beyond) if found is None else (alone, found)
 
 
 def _behind(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from turgor.fem.programme import LoadLine
 from turgor.fem.state import State
 from turgor.fem.system import System
+from turgor.solver.apiece import first_changes
 from turgor.solver.control import Control
 from turgor.solver.events import Event
 from turgor.solver.stiffness import StiffnessSolver
@@ -46,6 +47,8 @@ class Equilibrium:
         The eigenmode in which the tangent loses its stiffness there, ``(n_points, d)``, if the event has one.
     expected
         Change of the conjugate from the guess to here that the tangent at the guess expected.
+    expected_volumes
+        The same of the volume of each cavity under pressure ``(n_cavities,)``.
     """
 
     state: State
@@ -57,6 +60,7 @@ class Equilibrium:
     event: Event | None = None
     mode: Floats | None = None
     expected: float = 0.0
+    expected_volumes: Floats | None = None
 
     @property
     def iterations(self) -> int:
@@ -172,6 +176,7 @@ def find_equilibrium(
             step = tangent.solved(residual, pending if moving else None)
             if len(progress.tangents) == 1:
                 progress.expected = -float(np.vdot(system.load_direction(state, line.growth), step.du))
+                progress.expected_volumes = first_changes(system, state, step.du)
         state, damping = _advanced(system, state, step, progress.residuals, search=control is None and not moving)
         # What a shortened step left of the given displacements is imposed by the next one.
         pending = (1.0 - damping) * pending
@@ -287,6 +292,7 @@ def _accepted(
         tangent.inertia(),
         tangent.compliance,
         expected=progress.expected,
+        expected_volumes=progress.expected_volumes,
     )
 
 

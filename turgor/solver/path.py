@@ -15,6 +15,7 @@ from turgor.common.log import logger
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
+from turgor.solver.apiece import STEEPER, changes, steep_alone, taking_part
 from turgor.solver.choice import make_stiffness_solver
 from turgor.solver.control import Volume
 from turgor.solver.events import Event
@@ -34,6 +35,7 @@ from turgor.solver.volume import (
     is_monotone,
     knows_volume,
     softest_mode,
+    turns_alone,
 )
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
@@ -48,9 +50,8 @@ FAILURES = 2
 """After so many failed steps on the way to one load, volume control looks for what is in the way."""
 
 LARGE_CHANGE = 1.0
-STEEPER = 2.0
-"""A step is asked whether it has jumped if it has changed the conjugate by more than this part of it, or so many times
-as fast as the step before (the first step: as the tangent at its start says).
+"""A step is asked whether it has jumped if it has changed the conjugate by more than this part of it, or `STEEPER`
+times as fast as the step before (the first step: as the tangent at its start says).
 
 Where cavities are roomy, a wall that snaps changes the conjugate by little: a shallow arch by a twentieth, 16 times as
 fast as the step before. Before its limit it gives way up to twice as fast from step to step.
@@ -64,6 +65,9 @@ LAGS = 25
 
 RUBBING = 1e-3
 """The forces of friction have settled when they change by less than this part of all forces of contact."""
+
+SAME = 1e-9
+"""Part of a step's size below which two conjugates are one."""
 
 VOLUME_STEPS = 60
 """Steps that volume control may take between two requested loads."""
@@ -267,22 +271,34 @@ class _Walk:
 
         The load is a smooth function of its conjugate, also through limits, where nothing grows with it that moves the
         conjugate by itself. Its slopes are the inverse compliances
-        (:func:`turgor.solver.volume.is_monotone`). They are asked for only where the conjugate has changed much.
+        (:func:`turgor.solver.volume.is_monotone`). They are asked for only where the conjugate has changed much. A
+        cavity that snaps alone may hardly change it, so that the volume of each is looked at, too.
         """
         system, linear, here = self.system, self.linear, self.here
         if system.is_moved:
             return False
         growth = system.loading.growth(here.fraction)
         before, after = (system.conjugate(e.state, growth) for e in (here, found))
-        mean = (after - before) / (found.fraction - here.fraction)
-        if abs(after - before) <= LARGE_CHANGE * abs(before) and not self._is_uneven(before, after, found, growth):
+        large = abs(after - before) > LARGE_CHANGE * abs(before) or self._is_uneven(before, after, found, growth)
+        suspects = [*([growth] if large else []), *self._uneven_alone(found)]
+        if not suspects:
             return False
-        at_end = compliance(system, linear, found.state, growth, growth)
+        at_end = [compliance(system, linear, found.state, weights, growth) for weights in suspects]
         factorise_tangent(system, linear, here.state)
-        at_start = compliance(system, linear, here.state, growth, growth)
-        if mean == 0.0 or min(at_start, at_end) <= 0.0:
-            return False  # nothing gives way to the loads yet, as before a body is touched
-        return not is_monotone(1.0 / mean, 1.0 / at_start, 1.0 / at_end)
+        at_start = [compliance(system, linear, here.state, weights, growth) for weights in suspects]
+        size = found.fraction - here.fraction
+        means = [(system.conjugate(found.state, w) - system.conjugate(here.state, w)) / size for w in suspects]
+        slopes = list(zip(means, at_start, at_end, strict=True))
+        return (large and _turns(*slopes[0])) or any(turns_alone(*of_one) for of_one in slopes[large:])
+
+    def _uneven_alone(self, found: Equilibrium) -> list[Floats]:
+        """Return the weights of the cavities, of several, whose volumes have changed much faster than expected."""
+        here = self.here
+        if not self.past:
+            return steep_alone(self.system, here.state, found.state, found.expected_volumes)
+        earlier = self.past[-1]
+        reach = (found.fraction - here.fraction) / (here.fraction - earlier.fraction)
+        return steep_alone(self.system, here.state, found.state, changes(self.system, earlier.state, here.state, reach))
 
     def _is_uneven(self, before: float, after: float, found: Equilibrium, growth: Floats) -> bool:
         """Whether the conjugate has changed unevenly on a step, or much faster than on the one before.
@@ -343,11 +359,24 @@ class _Walk:
         NotConvergedError
             If it has one that cannot be located.
         """
+        system, growth = self.system, self.system.loading.growth(self.here.fraction)
+        found = self._following(growth, target)
+        if found is None:
+            # Where others grow with the load fraction more than those that give way, their sum turns with it.
+            mode = softest_mode(system, self.linear, self.here.state, growth)
+            part = taking_part(system, self.here.state, mode, growth)
+            found = None if np.array_equal(part, growth) else self._following(part, target)
+        return found
+
+    def _following(self, weights: Floats, target: float) -> Equilibrium | None:
+        """Do as :meth:`_by_volume` by the conjugate of the given weights."""
         log.info("going on by volume control from %.4g", self.here.fraction)
-        system, quantity = self.system, Volume(self.system.loading.growth(self.here.fraction))
+        system, quantity = self.system, Volume(weights)
         rest = self.past[-1].state if self.past else system.reference_state()
-        now, then = (system.conjugate(state, quantity.weights) for state in (self.here.state, rest))
-        step = 0.5 * abs(now - then) or 0.05 * abs(now)
+        now, then = (system.conjugate(state, weights) for state in (self.here.state, rest))
+        whole = 0.05 * system.conjugate(self.here.state, np.abs(weights))
+        # Cavities that grow against each other may add up to nothing.
+        step = 0.5 * abs(now - then) if abs(now - then) > SAME * abs(whole) else abs(whole)
         if step == 0.0:
             return None
         walk = VolumeWalk(system, self.linear, self.here, step, self.options.newton, quantity)
@@ -430,6 +459,13 @@ class _Walk:
         known = (*self.past, here)
         state, _ = predicted(self.system, [e.fraction for e in known], [e.state for e in known], aim)
         return state
+
+
+def _turns(mean: float, at_start: float, at_end: float) -> bool:
+    """Whether the load may turn on a step, from the conjugate's mean slope by it and those at both ends."""
+    if mean == 0.0 or min(at_start, at_end) <= 0.0:
+        return False  # nothing gives way to the loads yet, as before a body is touched
+    return not is_monotone(1.0 / mean, 1.0 / at_start, 1.0 / at_end)
 
 
 def output_fractions(steps: int) -> list[float]:

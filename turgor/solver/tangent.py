@@ -104,7 +104,7 @@ class Progress:
     """What an iteration has spent, and whether it is on its way to an equilibrium.
 
     ``residuals`` before each iteration; of each tangent that was factorised, the residual and its negative pivots;
-    what the first one ``expected`` the conjugate of the load fraction to change by.
+    what the first one ``expected`` the conjugate of the load fraction, and the volumes, to change by.
     """
 
     def __init__(self, options: NewtonOptions) -> None:
@@ -112,6 +112,7 @@ class Progress:
         self.residuals: list[float] = []
         self.tangents: list[tuple[float, int]] = []
         self.expected = 0.0
+        self.expected_volumes: Floats | None = None
 
     @property
     def hopeless(self) -> str | None:

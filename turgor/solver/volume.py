@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.log import logger
+from turgor.fem.programme import LoadLine
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
+from turgor.solver.apiece import changes, steep_alone
 from turgor.solver.area import area_to_chord
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
@@ -105,11 +107,13 @@ class VolumeWalk:
         Part of the first step below which none is cut.
     watched
         Another quantity of the same weights, of which no step is to hide limits.
+    line
+        How the loads follow the load fraction; left out, as at the start, also where the walk passes a kink of theirs.
 
     Attributes
     ----------
     line
-        How the loads follow the load fraction: as at the start, also where the walk passes a kink of theirs.
+        How the loads follow the load fraction.
     """
 
     def __init__(
@@ -124,12 +128,13 @@ class VolumeWalk:
         longest: float = np.inf,
         smallest_part: float = SMALLEST_PART,
         watched: Quantity | None = None,
+        line: LoadLine | None = None,
     ) -> None:
         self.system = system
         self.linear = linear
         self.options = options
         self.quantity = quantity or Volume()
-        self.line = system.loading.line_at(start.fraction)
+        self.line = line or system.loading.line_at(start.fraction)
         self.longest, self.smallest_part = longest, smallest_part
         self.watched = watched
         self.here = start if start.compliance is not None else self.with_compliance(start)
@@ -199,6 +204,9 @@ class VolumeWalk:
         """
         if self._may_have_snapped(found) or self._has_left(found):
             log.info("the step has left the path")
+            return True
+        if self._one_has_left(found):
+            log.info("on the step one cavity has left the path")
             return True
         if part > SHORT_ENOUGH and self._may_hide_limits(found):
             log.info("the step may hide limits")
@@ -375,6 +383,25 @@ class VolumeWalk:
         most = abs(found.fraction - self.here.fraction) + change * sum(abs(_slope_of_load(end)) for end in ends)
         return area_to_chord(self.system, self.quantity.weights, self.line.growth, ends) > 0.5 * change * most
 
+    def _one_has_left(self, found: Equilibrium) -> bool:
+        """Whether the volume of one cavity, of several, has jumped where the others hide it."""
+        system, here, weights = self.system, self.here, self.quantity.weights
+        expected = None  # of a first step, which may set out next to a limit, all that change are looked at
+        span = self._conjugate(found) - self._conjugate(here)
+        if self.before is not None:
+            reach = span / (self._conjugate(here) - self._conjugate(self.before))
+            expected = changes(system, self.before.state, here.state, reach)
+        suspects = steep_alone(system, here.state, found.state, expected)
+        if not suspects or span == 0.0:
+            return False
+        slopes = []
+        for end in (found, here):
+            factorise_tangent(system, self.linear, end.state)
+            by_load = [compliance(system, self.linear, end.state, w, self.line.growth) for w in (weights, *suspects)]
+            slopes.append([slope / by_load[0] for slope in by_load[1:]])
+        means = [(system.conjugate(found.state, w) - system.conjugate(here.state, w)) / span for w in suspects]
+        return any(turns_alone(*of_one) for of_one in zip(means, *reversed(slopes), strict=True))
+
     def _may_hide_limits(self, found: Equilibrium) -> bool:
         """Whether the load, or what is watched, may have a maximum and a minimum on the way to a state, both hidden."""
         return self._may_turn(found) or (self.watched is not None and self._may_turn(found, self.watched))
@@ -411,6 +438,16 @@ def is_monotone(mean: float, at_start: float, at_end: float) -> bool:
     (Fritsch and Carlson 1980); the slopes have one sign.
     """
     return mean * at_start > 0.0 and math.hypot(at_start, at_end) <= MONOTONE * abs(mean)
+
+
+def turns_alone(mean: float, at_start: float, at_end: float) -> bool:
+    """Whether what is prescribed may turn on a step, from the slopes of one cavity's volume by it.
+
+    Other cavities may move it either way, and ever faster: that is no jump.
+    """
+    if min(mean * at_start, mean * at_end) <= 0.0 or abs(at_start) <= abs(mean) <= abs(at_end):
+        return False
+    return not is_monotone(1.0 / mean, 1.0 / at_start, 1.0 / at_end)
 
 
 def stable_while_held(
