@@ -124,3 +124,21 @@ def test_energy_is_the_work_of_each_pressure_on_its_own_volume():
         change = [cavity.volume(after.u) - cavity.volume(before.u) for cavity in system.cavities]
         work += float(0.5 * (before.loads + after.loads) @ change)
     assert bulk[-1] - bulk[0] == pytest.approx(work, rel=1e-3)
+
+
+def test_times_that_differ_by_rounding_are_one():
+    # 0.7 s and 700 ms of 4 s, and a state asked for at either: steps of the last digit were tried and cut to nothing.
+    point, beside = 0.7 / 4.0, 700.0 * 0.001 / 4.0
+    assert 0.0 < abs(beside - point) < 1e-15
+    held = Programme((0.0, point, 1.0), (0.0, 0.0, -1.0))
+    up = Programme((0.0, beside, 1.0), (0.0, 1.0, 0.5))
+    system = two_arches((LIMIT, up), (LIMIT, held), (-1.2, -1.2))
+    assert len(system.loading.kinks) == 1
+    low, high = sorted((point, beside))
+    assert system.loading.growth(low) == pytest.approx(system.loading.growth(high), rel=1e-12)
+    assert system.loading.growth(low)[0] < 0.0
+    for asked in (low, high):
+        told: list[float] = []
+        found = solve_path(system, [asked, 1.0], on_progress=lambda aim, iteration, residual, t=told: t.append(aim))
+        assert [e.fraction for e in found] == [asked, 1.0]
+        assert set(told) == {asked, 1.0}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from turgor.common.errors import InputError
 from turgor.common.names import PRESSURE_PREFIX
 from turgor.fem.contact.spec import RigidContact
 from turgor.fem.loads import Gravity, Load, Pressure
-from turgor.fem.programme import PROPORTIONAL, LoadLine, Programme
+from turgor.fem.programme import PROPORTIONAL, ROUNDING, LoadLine, Programme
 
 Floats = NDArray[np.float64]
 
@@ -60,8 +61,10 @@ class Loading:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """The load fractions within (0, 1) at which a load's programme changes its slope, ascending."""
-        return tuple(sorted({f for _, programme in self._programmes for f in programme.kinks if 0.0 < f < 1.0}))
+        """The load fractions within (0, 1) at which a load's programme changes its slope, ascending and apart."""
+        found = sorted(f for _, programme in self._programmes for f in programme.kinks if ROUNDING < f < 1.0 - ROUNDING)
+        apart = [True, *(later - earlier > ROUNDING for earlier, later in itertools.pairwise(found))]
+        return tuple(itertools.compress(found, apart))
 
     @property
     def acts_at_start(self) -> bool:

@@ -12,6 +12,9 @@ from turgor.common.errors import InputError
 
 Floats = NDArray[np.float64]
 
+ROUNDING = 1e-12
+"""Load fractions that differ by no more are one: 700 ms and 0.7 s are not the same number."""
+
 
 @dataclass(frozen=True)
 class Programme:
@@ -62,7 +65,7 @@ class Programme:
 
     def _line(self, fraction: float) -> int:
         last = len(self.fractions) - 2
-        return int(np.clip(np.searchsorted(self.fractions, fraction, side="right") - 1, 0, last))
+        return int(np.clip(np.searchsorted(self.fractions, fraction + ROUNDING, side="right") - 1, 0, last))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from turgor.common.blas import dense_products_on_one_thread
 from turgor.common.errors import InputError, SolverError
 from turgor.common.log import logger
+from turgor.fem.programme import ROUNDING
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
@@ -154,8 +155,10 @@ def solve_path(
             walk.settle()
             walk.deliver()
         for fraction in wanted:
-            for stop in (*(kink for kink in system.loading.kinks if kink < fraction), fraction):
-                walk.to(stop)
+            for kink in system.loading.kinks:
+                if walk.here.fraction + ROUNDING < kink < fraction - ROUNDING:
+                    walk.to(kink)
+            walk.to(fraction)
             walk.deliver()
     except NotConvergedError as error:
         walk.deliver()
@@ -203,7 +206,8 @@ class _Walk:
     def to(self, target: float) -> None:
         """Walk to the load fraction `target`."""
         self._failures = 0
-        turns = target in self.system.loading.kinks and self.here.fraction < target
+        at_kink = any(abs(target - kink) <= ROUNDING for kink in self.system.loading.kinks)
+        turns = at_kink and self.here.fraction < target
         while self.here.fraction < target:
             step = self._longest_step()
             aim = min(target, self.here.fraction + step)
