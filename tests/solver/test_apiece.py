@@ -142,3 +142,15 @@ def test_times_that_differ_by_rounding_are_one():
         found = solve_path(system, [asked, 1.0], on_progress=lambda aim, iteration, residual, t=told: t.append(aim))
         assert [e.fraction for e in found] == [asked, 1.0]
         assert set(told) == {asked, 1.0}
+
+
+@pytest.mark.parametrize("fall", [0.3, 0.45])
+def test_a_limit_is_told_of_the_cavity_that_gives_way(fall: float):
+    # The other one's pressure changes faster, and falls: its limit was called a minimum of the way back.
+    up = Programme((0.0, 0.5, 1.0), (0.0, 0.5, 1.0))
+    down = Programme((0.0, 0.5, 0.5 + fall, 1.1), (0.0, 0.9, 0.0, 0.0))
+    system = two_arches((1.5 * LIMIT, up), (LIMIT, down), (1.2, 1.2))
+    with pytest.raises(LimitPressureError, match="grows while the pressure in y1-0 falls") as stopped:
+        solve_path(system, output_fractions(4))
+    assert stopped.value.limit.event is Event.LIMIT
+    assert float(stopped.value.limit.equilibrium.state.loads[0]) == pytest.approx(LIMIT, rel=1e-4)

@@ -57,9 +57,20 @@ def steep_alone(system: System, here: State, found: State, expected: Floats | No
     return list(unit_weights(system)[steep])
 
 
+def work_in(system: System, state: State, mode: Floats, growth: Floats) -> Floats:
+    """Return the work that the growth of each load does in a mode ``(n_loads,)``; zero where it is next to none."""
+    units = np.eye(len(growth))
+    work = growth * [-np.vdot(system.load_direction(state, unit), mode) for unit in units]
+    return np.where(np.abs(work) >= TAKES_PART * np.abs(work).max(), work, 0.0)
+
+
 def taking_part(system: System, state: State, mode: Floats, growth: Floats) -> Floats:
     """Return the loads' growth ``(n_loads,)`` with zero for those that do no work in a mode, or all of it."""
-    units = np.eye(len(growth))
-    work = growth * [np.vdot(system.load_direction(state, unit), mode) for unit in units]
-    part = np.where(np.abs(work) >= TAKES_PART * np.abs(work).max(), growth, 0.0)
+    part = np.where(work_in(system, state, mode, growth) != 0.0, growth, 0.0)
     return part if np.any(part) else growth
+
+
+def leading_in(system: System, state: State, mode: Floats, growth: Floats) -> int:
+    """Return the place of the load that does most work in a mode: a pressure, if one does."""
+    work = work_in(system, state, mode, growth)
+    return system.loading.leading(work if np.any(work) else growth)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from turgor.common.errors import SolverError
 from turgor.common.names import PRESSURE_PREFIX
@@ -15,6 +16,7 @@ from turgor.fem.surface import surface_stretches
 from turgor.fem.system import System
 from turgor.materials.stability import drucker_margin, verdict
 from turgor.mesh.faces import boundary_faces
+from turgor.solver.apiece import leading_in, taking_part
 from turgor.solver.events import Outcome
 from turgor.solver.newton import Equilibrium, NotConvergedError
 from turgor.solver.volume import LimitPoint, knows_volume
@@ -126,7 +128,7 @@ def at_limit(
     facts = load_facts(system, limit.equilibrium)
     worst = int(np.argmax(np.linalg.norm(system.body_part(limit.mode), axis=1)))
     facts["mode_largest_at_mm"] = [round(float(x), 3) for x in system.mesh.points[worst]]
-    beyond = _beyond(system, limit.equilibrium)
+    beyond = _beyond(system, limit)
     advice = (
         "a thicker wall, a stiffer or a stiffening material raises the limit"
         if limit.maximum
@@ -156,15 +158,31 @@ def _follows_volume(system: System, here: Equilibrium) -> bool:
     return bool(pressures) and not (timed or system.rubs) and knows_volume(system, here.state)
 
 
-def _beyond(system: System, limit: Equilibrium) -> str:
+def _beyond(system: System, limit: LimitPoint) -> str:
     """Say how the actuator goes on behind a limit: the conjugate of the load grows further while the load falls."""
-    growth = system.loading.growth(limit.fraction)
-    leading = system.loading.leading(growth)
+    state, growth = limit.equilibrium.state, system.loading.growth(limit.equilibrium.fraction)
+    leading = leading_in(system, state, limit.mode, growth)
     if not system.loading.names[leading].startswith(PRESSURE_PREFIX):
         return "gives way while the load falls"
-    if limit.state.loads[leading] < 0.0:
-        return "shrinks while the suction falls" if growth[leading] < 0.0 else "grows while the suction rises"
-    return "grows while the pressure falls" if growth[leading] > 0.0 else "shrinks while the pressure rises"
+    where = _giving_way(system, limit, growth)
+    if state.loads[leading] < 0.0:
+        return (
+            f"shrinks while the suction{where} falls"
+            if growth[leading] < 0.0
+            else f"grows while the suction{where} rises"
+        )
+    return (
+        f"grows while the pressure{where} falls"
+        if growth[leading] > 0.0
+        else f"shrinks while the pressure{where} rises"
+    )
+
+
+def _giving_way(system: System, limit: LimitPoint, growth: NDArray[np.float64]) -> str:
+    """Name the cavities that give way at a limit, where others do not."""
+    part = taking_part(system, limit.equilibrium.state, limit.mode, growth)
+    names = [cavity.name for cavity in system.cavities if part[cavity.channel] != 0.0]
+    return f" in {', '.join(names)}" if len(names) < len(system.cavities) else ""
 
 
 def load_facts(system: System, here: Equilibrium) -> Facts:

@@ -18,7 +18,7 @@ from turgor.fem.programme import LoadLine
 from turgor.fem.state import State
 from turgor.fem.system import System
 from turgor.solver.apart import kept_apart
-from turgor.solver.apiece import changes, steep_alone
+from turgor.solver.apiece import changes, leading_in, steep_alone
 from turgor.solver.area import area_to_chord
 from turgor.solver.control import Quantity, Volume
 from turgor.solver.events import Event
@@ -265,7 +265,8 @@ class VolumeWalk:
             If the limit cannot be located, or the two lie on different branches; the walk stands at `second` again.
         """
         best, change = self.stationary_between(first, second, _fraction, _slope_of_load, tolerance)
-        return LimitPoint(best, self._is_largest(best, change), self.softest_mode(best))
+        mode = self.softest_mode(best)
+        return LimitPoint(best, self._is_largest(best, mode, change), mode)
 
     def stationary_between(
         self,
@@ -319,10 +320,10 @@ class VolumeWalk:
             raise NotConvergedError(f"the path jumps near {best.fraction:.4g} of the load, where a limit was expected")
         return best, ends[0][1] * span
 
-    def _is_largest(self, limit: Equilibrium, change: float) -> bool:
-        """Whether the leading load is largest in size at a limit, to which the load fraction has come by a `change`."""
+    def _is_largest(self, limit: Equilibrium, mode: Floats, change: float) -> bool:
+        """Whether the load that gives way in a limit's mode is largest there, come to by a `change` of the fraction."""
         growth = self.line.growth
-        leading = self.system.loading.leading(growth)
+        leading = leading_in(self.system, limit.state, mode, growth)
         return bool(change * growth[leading] * limit.state.loads[leading] > 0.0)
 
     def softest_mode(self, equilibrium: Equilibrium) -> Floats:
