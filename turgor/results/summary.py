@@ -28,6 +28,7 @@ KEYS: dict[str, tuple[str, ...]] = {
 
 _PACKAGES = ("turgor", "numpy", "scipy", "numba", "mkl", "gmsh", "meshio")
 _NOT_FINAL = {"step", "fraction", "event", *SOLVER_FACTS}
+_PLACES = ("time_s", "cavity_volume_mm3", "stable")
 _TIP = tuple(f"tip_displacement_{axis}_mm" for axis in "xyz")
 
 
@@ -91,8 +92,8 @@ def summarise(
 
 def _event(entry: Row) -> Row:
     """Return what a special state is, where it is, and its step, whose file holds its mode."""
-    places = ("pressure_kPa", "cavity_volume_mm3", "stable")
-    return {"event": entry["event"], "step": entry["step"]} | {key: entry[key] for key in places if key in entry}
+    places = [key for key in entry if key in _PLACES or (key.startswith("pressure_") and key.endswith("_kPa"))]
+    return {"event": entry["event"], "step": entry["step"]} | {key: entry[key] for key in places}
 
 
 def versions() -> dict[str, str]:
