@@ -22,7 +22,7 @@ from turgor.solver.control import Volume
 from turgor.solver.events import Event, Outcome
 from turgor.solver.follow import follow
 from turgor.solver.path import LimitPressureError, PathOptions, solve_path
-from turgor.solver.volume import stable_while_held
+from turgor.solver.slopes import stable_while_held
 
 C10, C01, RATIO = 0.05, 0.007, 1.2
 

@@ -27,7 +27,8 @@ from turgor.solver.events import Event, Outcome
 from turgor.solver.follow import follow, follow_arc
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError
 from turgor.solver.path import LimitPressureError, PathOptions, StoppedShortError, output_fractions, solve_path
-from turgor.solver.volume import VolumeWalk, is_monotone, stable_while_held
+from turgor.solver.slopes import is_monotone, stable_while_held
+from turgor.solver.volume import VolumeWalk
 
 ONE = np.ones(1)
 LIMIT, MINIMUM = 1.12607e-4, 2.43356e-5

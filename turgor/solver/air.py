@@ -10,8 +10,9 @@ from turgor.common.log import logger
 from turgor.solver.control import Air, Volume
 from turgor.solver.events import Event, Outcome
 from turgor.solver.newton import Equilibrium, NotConvergedError
+from turgor.solver.slopes import slope_of
 from turgor.solver.stops import StoppedShortError, load_facts, load_text
-from turgor.solver.volume import VolumeWalk, slope_of
+from turgor.solver.volume import VolumeWalk
 
 log = logger("solver")
 

@@ -19,9 +19,10 @@ from turgor.solver.arc import Arc
 from turgor.solver.control import Volume
 from turgor.solver.events import Event
 from turgor.solver.newton import Equilibrium, NotConvergedError, find_equilibrium
+from turgor.solver.slopes import knows_volume
 from turgor.solver.stops import Facts, at_limit, worst_point
 from turgor.solver.tally import Tally
-from turgor.solver.volume import LimitPoint, VolumeWalk, knows_volume
+from turgor.solver.volume import LimitPoint, VolumeWalk
 
 log = logger("solver")
 

@@ -23,21 +23,11 @@ from turgor.solver.events import Event
 from turgor.solver.limits import after_snap, at_load
 from turgor.solver.newton import Equilibrium, NewtonOptions, NotConvergedError, find_equilibrium
 from turgor.solver.prediction import predicted
+from turgor.solver.slopes import compliance, is_monotone, knows_volume, softest_mode, turns_alone
 from turgor.solver.stops import LimitPressureError, StoppedShortError, at_limit, stopped
 from turgor.solver.tally import Tally
 from turgor.solver.tangent import factorise_tangent
-from turgor.solver.volume import (
-    CUT,
-    EASY,
-    FEW_CUTS,
-    LimitPoint,
-    VolumeWalk,
-    compliance,
-    is_monotone,
-    knows_volume,
-    softest_mode,
-    turns_alone,
-)
+from turgor.solver.volume import CUT, EASY, FEW_CUTS, LimitPoint, VolumeWalk
 
 __all__ = ["LimitPressureError", "PathOptions", "StoppedShortError", "output_fractions", "solve_path"]
 
@@ -275,7 +265,7 @@ class _Walk:
 
         The load is a smooth function of its conjugate, also through limits, where nothing grows with it that moves the
         conjugate by itself. Its slopes are the inverse compliances
-        (:func:`turgor.solver.volume.is_monotone`). They are asked for only where the conjugate has changed much. A
+        (:func:`turgor.solver.slopes.is_monotone`). They are asked for only where the conjugate has changed much. A
         cavity that snaps alone may hardly change it, so that the volume of each is looked at, too.
         """
         system, linear, here = self.system, self.linear, self.here

@@ -19,7 +19,8 @@ from turgor.mesh.faces import boundary_faces
 from turgor.solver.apiece import leading_in, taking_part
 from turgor.solver.events import Outcome
 from turgor.solver.newton import Equilibrium, NotConvergedError
-from turgor.solver.volume import LimitPoint, knows_volume
+from turgor.solver.slopes import knows_volume
+from turgor.solver.volume import LimitPoint
 
 Facts = dict[str, object]
 

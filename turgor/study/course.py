@@ -15,7 +15,7 @@ from turgor.solver.control import Air, Quantity, Volume
 from turgor.solver.follow import follow, follow_arc, settled
 from turgor.solver.newton import Equilibrium
 from turgor.solver.path import PathOptions, output_fractions, solve_path
-from turgor.solver.volume import stable_while_held
+from turgor.solver.slopes import stable_while_held
 from turgor.study.control import AirControl, ArcLengthControl, VolumeControl, volume_of
 
 OnEquilibrium = Callable[[Equilibrium], None]
