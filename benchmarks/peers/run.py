@@ -102,7 +102,7 @@ PEERS = {
         cases=IN_ROWS,
     ),
     "calculix": Peer("CalculiX", "with_calculix.py", program="ccx", cases=("tube",)),
-    "febio": Peer("FEBio", "with_febio.py", program="febio4", cases=("tube", "tube-quarter")),
+    "febio": Peer("FEBio", "with_febio.py", arguments=("5",), program="febio4", cases=("tube", "tube-quarter")),
 }
 
 

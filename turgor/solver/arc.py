@@ -21,7 +21,7 @@ SHORTER = 0.5
 LARGEST_AREA = 0.5
 """Area between the path along a step and its chord, in parts of the square over the chord, above which it has jumped.
 
-Half a circle makes 0.39; steps of arches, domes and balloons that kept to their path had up to 0.37, jumps more than 1.
+Half a circle makes 0.39; a jump encloses a loop beside that.
 """
 
 
