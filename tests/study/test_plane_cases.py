@@ -34,6 +34,15 @@ measures:
 """
 
 
+def bellows_case(folder: Path, height: float, measured: tuple[float, ...]) -> Path:
+    """Write the case, and a table with its top at rest at the pressures that are `measured`, kPa."""
+    rows = "".join(f"{pressure},1,0,{height},0\n" for pressure in measured)
+    (folder / "tips.csv").write_text(f"pressure (kPa),marker,x (mm),y (mm),z (mm)\n{rows}", encoding="utf-8")
+    case = folder / "bellows.yaml"
+    case.write_text(BELLOWS.replace("TIP", f"{height!r} mm"), encoding="utf-8")
+    return case
+
+
 @pytest.fixture
 def unreported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("turgor.study.run.report", lambda folder: folder)
@@ -42,11 +51,7 @@ def unreported(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("unreported")
 def test_a_body_of_revolution_runs_from_a_case_file(tmp_path: Path) -> None:
     height = tg.Bellows(convolutions=1).height
-    case = tmp_path / "bellows.yaml"
-    case.write_text(BELLOWS.replace("TIP", f"{height!r} mm"), encoding="utf-8")
-    table = f"pressure (kPa),marker,x (mm),y (mm),z (mm)\n5,1,0,{height},0\n"
-    (tmp_path / "tips.csv").write_text(table, encoding="utf-8")
-    done = run(load_case(case), tmp_path / "run")
+    done = run(load_case(bellows_case(tmp_path, height, (5,))), tmp_path / "run")
     rows = RunStore.open(done.folder).history
     assert [entry["pressure_kPa"] for entry in rows] == pytest.approx([0.0, 5.0, 10.0])
     assert rows[0]["tip_displacement_y_mm"] < 0.0  # its weight acts along −y
@@ -68,11 +73,7 @@ def test_a_body_of_revolution_runs_from_a_case_file(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("unreported")
 def test_a_comparison_with_no_measured_state_is_told(tmp_path: Path) -> None:
-    height = tg.Bellows(convolutions=1).height
-    case = tmp_path / "bellows.yaml"
-    case.write_text(BELLOWS.replace("TIP", f"{height!r} mm"), encoding="utf-8")
-    table = f"pressure (kPa),marker,x (mm),y (mm),z (mm)\n7,1,0,{height},0\n20,1,0,{height},0\n"
-    (tmp_path / "tips.csv").write_text(table, encoding="utf-8")
+    case = bellows_case(tmp_path, tg.Bellows(convolutions=1).height, (7, 20))
     done = run(load_case(case), tmp_path / "run")
     told = (done.folder / "run.log").read_text(encoding="utf-8")
     assert "measures.marker_rmse: marker_rmse_percent is empty in every step; 'tips.csv' has what was measured" in told

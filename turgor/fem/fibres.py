@@ -207,9 +207,8 @@ def _parts_in_body(mesh: Mesh, ends: Floats, key: str) -> Floats:
     for plane, holds in zip(planes, inside, strict=True):
         if holds.any():
             plane.check_behind(mesh, "it does not halve a fibre", key)
-    normals = np.array([plane.normal for plane in planes]).reshape(len(planes), 3)
     for cut in np.unique(inside, axis=1).T:
-        part[(cut == inside.T).all(axis=1)] = part_in_front(normals[cut])
+        part[(cut == inside.T).all(axis=1)] = part_in_front(list(itertools.compress(planes, cut)))
     return part
 
 

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from turgor.common.errors import InputError
-from turgor.common.rows import row_numbers
 from turgor.fem.state import State
 from turgor.fem.term import Mixed, add_at_nodes, pack_symmetric
 from turgor.mesh.cells import Cell, body_cell
-from turgor.mesh.faces import all_faces, shared_faces
+from turgor.mesh.faces import all_faces, places_of_faces, shared_faces
 from turgor.mesh.mesh import Mesh
 from turgor.mesh.symmetry import planes_of_symmetry
 
@@ -189,10 +188,9 @@ def _faces(mesh: Mesh, membrane: Membrane) -> Ints:
 
 def _in_planes_of_symmetry(mesh: Mesh, faces: Ints, key: str) -> NDArray[np.bool_]:
     """Return which of the faces ``(k, n)`` lie in the cut of a plane of symmetry, ``(k,)``."""
-    found = np.zeros(len(faces), bool)
+    found, corners = np.zeros(len(faces), bool), faces[:, : body_cell(faces).n_corners]
     for plane in planes_of_symmetry(mesh):
-        numbers = row_numbers(np.sort(np.vstack([faces, plane.faces]), axis=1))
-        inside = np.isin(numbers[: len(faces)], numbers[len(faces) :])
+        inside = places_of_faces(plane.faces, corners) >= 0
         if inside.any():
             plane.check_behind(mesh, "it does not halve a sheet", key)
         found |= inside

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,22 +84,22 @@ def planes_of_symmetry(mesh: Mesh) -> Iterator[SymmetryPlane]:
         faces = faces[~here]
 
 
-def part_in_front(normals: FloatArray) -> float:
+def part_in_front(planes: Sequence[SymmetryPlane]) -> float:
     """Return what part of a ball around a point of some planes is in front of all of them.
 
     Parameters
     ----------
-    normals
-        Their unit normals out of the body, ``(k, d)``, at most three: a cut, an edge or a corner.
+    planes
+        At most three: a cut, an edge or a corner.
 
     Returns
     -------
     float
         One without a plane, a half of one, a quarter of two square to each other.
     """
-    first, second = np.triu_indices(len(normals), 1)
-    between = np.pi - np.arccos(np.clip(np.sum(normals[first] * normals[second], axis=1), -1.0, 1.0))
-    if len(normals) < 2:
-        return 0.5 ** len(normals)
+    if len(planes) < 2:
+        return 0.5 ** len(planes)
+    cosines = [first.normal @ second.normal for first, second in itertools.combinations(planes, 2)]
+    between = np.pi - np.arccos(np.clip(cosines, -1.0, 1.0))
     # Of three, the excess of the spherical triangle over π is its solid angle.
-    return float(between[0] / (2.0 * np.pi) if len(normals) == 2 else (between.sum() - np.pi) / (4.0 * np.pi))
+    return float(between[0] / (2.0 * np.pi) if len(planes) == 2 else (between.sum() - np.pi) / (4.0 * np.pi))

@@ -163,8 +163,8 @@ def _states_section(store: RunStore) -> dict[str, Any]:
 
 def _part(mesh: Mesh) -> str | None:
     """Return what part of the whole a mesh is that planes of symmetry cut, however many surfaces they lie in."""
-    normals = np.array([plane.normal for plane in planes_of_symmetry(mesh)]).reshape(-1, mesh.dimension)
-    part = part_in_front(normals) if len(normals) <= _MOST_PLANES else 0.0
+    planes = list(planes_of_symmetry(mesh))
+    part = part_in_front(planes) if len(planes) <= _MOST_PLANES else 0.0
     return _PARTS.get(round(1.0 / part)) if part > 0.0 else None
 
 

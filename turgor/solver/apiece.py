@@ -39,8 +39,13 @@ def changes(system: System, before: State, after: State, times: float = 1.0) -> 
     return times * (volumes(system, after) - volumes(system, before))
 
 
-def first_changes(system: System, state: State, du: Floats) -> Floats:
-    """Return the first-order changes of the volumes of the cavities ``(n_cavities,)`` by a displacement."""
+def first_changes(system: System, state: State, du: Floats) -> Floats | None:
+    """Return the first-order changes of the volumes of the cavities ``(n_cavities,)`` by a displacement.
+
+    ``None`` where there are not several, as nothing is asked about one alone.
+    """
+    if len(system.cavities) < 2:
+        return None
     return np.array([-np.vdot(system.load_direction(state, weights), du) for weights in unit_weights(system)])
 
 

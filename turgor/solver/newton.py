@@ -48,7 +48,7 @@ class Equilibrium:
     expected
         Change of the conjugate from the guess to here that the tangent at the guess expected.
     expected_volumes
-        The same of the volume of each cavity under pressure ``(n_cavities,)``.
+        The same of the volume of each cavity under pressure ``(n_cavities,)``, if there are several.
     """
 
     state: State

@@ -165,18 +165,9 @@ def _beyond(system: System, limit: LimitPoint) -> str:
     leading = leading_in(system, state, limit.mode, growth)
     if not system.loading.names[leading].startswith(PRESSURE_PREFIX):
         return "gives way while the load falls"
-    where = _giving_way(system, limit, growth)
-    if state.loads[leading] < 0.0:
-        return (
-            f"shrinks while the suction{where} falls"
-            if growth[leading] < 0.0
-            else f"grows while the suction{where} rises"
-        )
-    return (
-        f"grows while the pressure{where} falls"
-        if growth[leading] > 0.0
-        else f"shrinks while the pressure{where} rises"
-    )
+    grows, sucked = bool(growth[leading] > 0.0), bool(state.loads[leading] < 0.0)
+    load = ("suction" if sucked else "pressure") + _giving_way(system, limit, growth)
+    return f"{'grows' if grows else 'shrinks'} while the {load} {'rises' if grows == sucked else 'falls'}"
 
 
 def _giving_way(system: System, limit: LimitPoint, growth: NDArray[np.float64]) -> str:

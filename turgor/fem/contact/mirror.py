@@ -162,11 +162,12 @@ def cut_across(body: RigidBody, ways: Floats, mesh: Mesh) -> tuple[Floats, float
     """
     places = mesh.points[:: 1 + len(mesh.points) // SAMPLES]
     distance = body.distance(places)[0]
-    normals = []
+    halving = []
     for plane in planes_of_symmetry(mesh):
         mirrored = places + 2.0 * plane.height(places)[:, None] * plane.normal
         alike = np.allclose(body.distance(mirrored)[0], distance, rtol=0.0, atol=ALIKE * float(np.ptp(places)))
         if alike and (np.abs(ways @ plane.normal) <= ALIKE * np.linalg.norm(ways, axis=1)).all():
-            normals.append(plane.normal)
+            halving.append(plane)
+    normals = [plane.normal for plane in halving]
     spanned = np.linalg.qr(np.array(normals).T)[0].T if normals else np.empty((0, mesh.dimension))
-    return in_space(spanned), part_in_front(np.array(normals).reshape(-1, mesh.dimension))
+    return in_space(spanned), part_in_front(halving)
